@@ -1,0 +1,1 @@
+"""Equations of motion of the whole satellite and what follows from them."""

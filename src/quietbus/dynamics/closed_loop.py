@@ -1,0 +1,147 @@
+"""The controlled satellite as one ordinary differential equation."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from quietbus.dynamics.equations import Accelerations, Wrench, accelerations
+from quietbus.dynamics.state import State
+from quietbus.model.cmg import ControlMomentGyro
+from quietbus.model.satellite import Satellite
+from quietbus.model.steering import singularity_measure
+from quietbus.spatial.rotation import (
+    attitude_error,
+    quaternion_conjugate,
+    quaternion_multiply,
+    quaternion_rate,
+    quaternion_to_matrix,
+)
+
+
+class ControlSignals(eqx.Module):
+    """What the attitude control and the steering decide at one instant."""
+
+    attitude_error_B: Float[Array, "3"]  # [rad]
+    torque_B: Float[Array, "3"]  # [N m] commanded, within the torque limit
+    integral_rate: Float[Array, "3"]  # [rad]
+    gimbal_rate_command: Float[Array, " cmg"]  # [rad/s] within the rate limit
+    gimbal_acceleration: Float[Array, " cmg"]  # [rad/s^2]
+    singularity: Float[Array, ""]  # [-]
+
+
+def rotor_angles(satellite: Satellite, t: Float[Array, ""]) -> Float[Array, " cmg"]:
+    """Rotor angles [rad] at time t [s]."""
+    return satellite.cluster.rotor_phase + satellite.cluster.rotor_speed * t
+
+
+def control_signals(satellite: Satellite, t: Float[Array, ""], state: State) -> ControlSignals:
+    """Controller, steering and gimbal servo at time t [s]."""
+    reference = satellite.guidance.reference(t)
+    error = attitude_error(reference.q_NR, state.q_NB)
+    cluster = satellite.cluster
+    h_rms = jnp.sqrt(jnp.mean(cluster.momentum**2))
+    h_rms = jnp.where(h_rms > 0.0, h_rms, 1.0)
+    t_axes = eqx.filter_vmap(ControlMomentGyro.R_PG)(cluster, state.gimbal_angle)[:, :, 1]
+    A = (cluster.momentum[:, None] * t_axes).T / h_rms
+
+    rate_command = jnp.zeros_like(state.gimbal_rate)
+    torque = integral_rate = jnp.zeros(3)
+    controller = satellite.controller
+    if controller is not None:
+        q_BR = quaternion_multiply(quaternion_conjugate(state.q_NB), reference.q_NR)
+        R_BR = quaternion_to_matrix(q_BR)
+        rate_error = state.w_NB_B - R_BR @ reference.w_NR_R
+        asked = controller.torque_B(
+            error, state.error_integral, rate_error, R_BR @ reference.dw_NR_R
+        )
+        torque = controller.limited(asked)
+        share = jnp.ones(())
+        if satellite.steering is not None:
+            # the reaction of dh/dt on the plate is the torque, in the nominal pose of the plate
+            momentum_rate = -quaternion_to_matrix(satellite.q_BP).T @ torque
+            rate_command = satellite.steering.rates(A, momentum_rate / h_rms, t)
+            share = satellite.servo.share(rate_command)
+            rate_command = share * rate_command
+        integral_rate = controller.integral_rate(error, asked, share * torque)
+    return ControlSignals(
+        error,
+        torque,
+        integral_rate,
+        rate_command,
+        satellite.servo.acceleration(rate_command, state.gimbal_rate),
+        singularity_measure(A),
+    )
+
+
+def external_wrench(satellite: Satellite, t: Float[Array, ""], state: State) -> Wrench:
+    """Sum of all external loads at time t [s]."""
+    attitude = {"bus": quaternion_to_matrix(state.q_NB), "plate": quaternion_to_matrix(state.q_NP)}
+    total = Wrench.zero()
+    for load in satellite.loads:
+        force, torque = load.wrench(t, attitude[load.body])
+        zero = jnp.zeros(3)
+        on = (zero, zero, force, torque) if load.body == "bus" else (force, torque, zero, zero)
+        total = jax.tree.map(jnp.add, total, Wrench(*on))
+    return total
+
+
+def evaluate(
+    satellite: Satellite,
+    t: Float[Array, ""],
+    state: State,
+    rotor_angle: Float[Array, " cmg"] | None = None,
+) -> tuple[ControlSignals, Accelerations]:
+    """Control decisions and accelerations at time t [s]; rotor angles as given or those of t."""
+    phi = rotor_angles(satellite, t) if rotor_angle is None else rotor_angle
+    signals = control_signals(satellite, t, state)
+    wrench = external_wrench(satellite, t, state)
+    return signals, accelerations(satellite, state, phi, signals.gimbal_acceleration, wrench)
+
+
+def state_rate(
+    satellite: Satellite,
+    t: Float[Array, ""],
+    state: State,
+    rotor_angle: Float[Array, " cmg"] | None = None,
+) -> State:
+    """Time derivative of the state."""
+    signals, acceleration = evaluate(satellite, t, state, rotor_angle)
+    R_NB, R_NP = quaternion_to_matrix(state.q_NB), quaternion_to_matrix(state.q_NP)
+    return State(
+        p_NB_N=state.v_NB_N,
+        q_NB=quaternion_rate(state.q_NB, state.w_NB_B),
+        p_NP_N=state.v_NP_N,
+        q_NP=quaternion_rate(state.q_NP, state.w_NP_P),
+        v_NB_N=acceleration.v_B,
+        w_NB_B=R_NB.T @ acceleration.w_B,
+        v_NP_N=acceleration.v_P,
+        w_NP_P=R_NP.T @ acceleration.w_P,
+        gimbal_angle=state.gimbal_rate,
+        gimbal_rate=signals.gimbal_acceleration,
+        error_integral=signals.integral_rate,
+    )
+
+
+def initial_state(
+    satellite: Satellite,
+    q_NB: Float[Array, "4"],
+    w_NB_B: Float[Array, "3"],
+    gimbal_angle: Float[Array, " cmg"],
+) -> State:
+    """Plate and bus moving as one, the plate in its nominal pose, bus mass centre at rest at 0."""
+    R_NB = quaternion_to_matrix(q_NB)
+    zero = jnp.zeros(3)
+    return State(
+        p_NB_N=zero,
+        q_NB=q_NB,
+        p_NP_N=R_NB @ satellite.p_BP_B,
+        q_NP=quaternion_multiply(q_NB, satellite.q_BP),
+        v_NB_N=zero,
+        w_NB_B=w_NB_B,
+        v_NP_N=R_NB @ jnp.cross(w_NB_B, satellite.p_BP_B),
+        w_NP_P=quaternion_to_matrix(satellite.q_BP).T @ w_NB_B,
+        gimbal_angle=gimbal_angle,
+        gimbal_rate=jnp.zeros_like(gimbal_angle),
+        error_integral=zero,
+    )

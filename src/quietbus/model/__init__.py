@@ -1,0 +1,1 @@
+"""The physical parts of the satellite, each a pytree of parameters with its own small physics."""

@@ -1,0 +1,3 @@
+"""Rotations and inertia tensors: the mathematics below the physics."""
+
+import quietbus.jaxconfig  # noqa: F401
