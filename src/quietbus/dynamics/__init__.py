@@ -1,1 +1,3 @@
 """Equations of motion of the whole satellite and what follows from them."""
+
+import quietbus.jaxconfig  # noqa: F401

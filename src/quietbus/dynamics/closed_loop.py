@@ -7,7 +7,7 @@ from jaxtyping import Array, Float
 
 from quietbus.dynamics.equations import Accelerations, Wrench, accelerations
 from quietbus.dynamics.state import State
-from quietbus.model.cmg import ControlMomentGyro
+from quietbus.model.cmg import ClusterMoments, ControlMomentGyro
 from quietbus.model.satellite import Satellite
 from quietbus.model.steering import singularity_measure
 from quietbus.spatial.rotation import (
@@ -17,6 +17,7 @@ from quietbus.spatial.rotation import (
     quaternion_rate,
     quaternion_to_matrix,
 )
+from quietbus.spatial.vector import rotate
 
 
 class ControlSignals(eqx.Module):
@@ -91,12 +92,15 @@ def evaluate(
     t: Float[Array, ""],
     state: State,
     rotor_angle: Float[Array, " cmg"] | None = None,
+    moments: ClusterMoments | None = None,
 ) -> tuple[ControlSignals, Accelerations]:
     """Control decisions and accelerations at time t [s]; rotor angles as given or those of t."""
     phi = rotor_angles(satellite, t) if rotor_angle is None else rotor_angle
     signals = control_signals(satellite, t, state)
     wrench = external_wrench(satellite, t, state)
-    return signals, accelerations(satellite, state, phi, signals.gimbal_acceleration, wrench)
+    return signals, accelerations(
+        satellite, state, phi, signals.gimbal_acceleration, wrench, moments
+    )
 
 
 def state_rate(
@@ -104,9 +108,10 @@ def state_rate(
     t: Float[Array, ""],
     state: State,
     rotor_angle: Float[Array, " cmg"] | None = None,
+    moments: ClusterMoments | None = None,
 ) -> State:
-    """Time derivative of the state."""
-    signals, acceleration = evaluate(satellite, t, state, rotor_angle)
+    """Time derivative of the state (arguments as of ``evaluate`` and ``accelerations``)."""
+    signals, acceleration = evaluate(satellite, t, state, rotor_angle, moments)
     R_NB, R_NP = quaternion_to_matrix(state.q_NB), quaternion_to_matrix(state.q_NP)
     return State(
         p_NB_N=state.v_NB_N,
@@ -114,9 +119,9 @@ def state_rate(
         p_NP_N=state.v_NP_N,
         q_NP=quaternion_rate(state.q_NP, state.w_NP_P),
         v_NB_N=acceleration.v_B,
-        w_NB_B=R_NB.T @ acceleration.w_B,
+        w_NB_B=rotate(R_NB.T, acceleration.w_B),
         v_NP_N=acceleration.v_P,
-        w_NP_P=R_NP.T @ acceleration.w_P,
+        w_NP_P=rotate(R_NP.T, acceleration.w_P),
         gimbal_angle=state.gimbal_rate,
         gimbal_rate=signals.gimbal_acceleration,
         error_integral=signals.integral_rate,

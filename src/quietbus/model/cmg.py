@@ -8,6 +8,7 @@ rotor's rigid-body properties, so its disturbance needs no force added by hand.
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from quietbus.spatial.inertia import point_inertia
@@ -96,15 +97,114 @@ class ControlMomentGyro(eqx.Module):
         return Carried(mass, mass * r + c, J, p, R_PG @ H_G + jnp.cross(r, p))
 
 
-def cluster_carried(
-    cluster: ControlMomentGyro,
-    gamma: Float[Array, " cmg"],
-    phi: Float[Array, " cmg"],
-    gamma_rate: Float[Array, " cmg"],
-) -> Carried:
-    """Mass moments of all units together."""
-    each = eqx.filter_vmap(ControlMomentGyro.carried)(cluster, gamma, phi, gamma_rate)
-    return jax.tree.map(lambda moment: jnp.sum(moment, axis=0), each)
+class CarriedMotion(eqx.Module):
+    """Mass moments of the moving cluster and their rates as seen in the plate."""
+
+    mass: Float[Array, ""]  # [kg]
+    c: Float[Array, "3"]  # [kg m]
+    J: Float[Array, "3 3"]  # [kg m^2]
+    p: Float[Array, "3"]  # [kg m/s] dc/dt
+    H: Float[Array, "3"]  # [N m s]
+    J_rate: Float[Array, "3 3"]  # [kg m^2/s]
+    p_rate: Float[Array, "3"]  # [N]
+    H_rate: Float[Array, "3"]  # [N m]
+
+
+class ClusterMoments(eqx.Module):
+    """Mass moments of the whole cluster as trigonometric polynomials of the angles.
+
+    Every moment of a unit is a polynomial of degree one (c, H of the rotor's spin) or two (J) in
+    the cosine and sine of its gimbal angle and of its rotor angle. Its coefficients follow
+    *exactly* from five equally spaced samples of either angle, and its time derivatives from those
+    of the basis 1, cos x, sin x, cos 2x, sin 2x. This makes the cluster cheap in the integrator's
+    inner loop, and it is also the expansion that the harmonic view needs.
+    """
+
+    mass: Float[Array, ""]  # [kg] of the cluster
+    rotor_speed: Float[Array, " cmg"]  # [rad/s]
+    c_H: Float[Array, "cmg 3 3 6"]  # c and H of the spin, by gimbal and rotor basis of degree 1
+    J: Float[Array, "cmg 5 5 6"]  # xx, yy, zz, xy, xz, yz
+    H_gimbal: Float[Array, "cmg 3 5 3"]  # [kg m^2] H per gimbal rate
+
+    @classmethod
+    def expand(cls, cluster: ControlMomentGyro) -> "ClusterMoments":
+        """Coefficients of all units."""
+
+        def sample(unit, gamma, phi):
+            held, moving = unit.carried(gamma, phi, 0.0), unit.carried(gamma, phi, 1.0)
+            return held.c, held.H, held.J[_PAIRS], moving.H - held.H
+
+        def unit(unit):
+            grid = jax.vmap(jax.vmap(sample, (None, None, 0)), (None, 0, None))
+            c, H, J, H_gimbal = grid(unit, _SAMPLES, _SAMPLES)
+            fit = lambda values: jnp.einsum("gi,fj,ijm->gfm", _FROM_SAMPLES, _FROM_SAMPLES, values)  # noqa: E731
+            return fit(jnp.concatenate([c, H], axis=2))[:3, :3], fit(J), fit(H_gimbal)[:3]
+
+        mass = jnp.sum(cluster.gimbal_mass + cluster.rotor_mass)
+        return cls(mass, cluster.rotor_speed, *eqx.filter_vmap(unit)(cluster))
+
+    def at(
+        self,
+        gamma: Float[Array, " cmg"],
+        phi: Float[Array, " cmg"],
+        gamma_rate: Float[Array, " cmg"],
+        gamma_acceleration: Float[Array, " cmg"],
+    ) -> CarriedMotion:
+        """Moments and rates at gimbal and rotor angles [rad], gimbal rates and accelerations."""
+        g, f = _basis(gamma)[:, :, :, None], _basis(phi)[:, :, None, :]
+        rate, speed = gamma_rate[:, None, None], self.rotor_speed[:, None, None]
+        acceleration = gamma_acceleration[:, None, None]
+        # the products of both bases, and their first and second time derivatives
+        b = g[0] * f[0]
+        b1 = rate * g[1] * f[0] + speed * g[0] * f[1]
+        b2 = (
+            rate**2 * g[2] * f[0]
+            + 2.0 * rate * speed * g[1] * f[1]
+            + speed**2 * g[0] * f[2]
+            + acceleration * g[1] * f[0]
+        )
+        c, b1_, p_rate = (_contract(row[:, :3, :3], self.c_H) for row in (b, b1, b2))
+        J, J_rate = (_contract(row, self.J)[_SYMMETRIC] for row in (b, b1))
+        H_gimbal = _contract(rate * b[:, :3], self.H_gimbal)
+        H_gimbal_rate = _contract(rate * b1[:, :3] + acceleration * b[:, :3], self.H_gimbal)
+        return CarriedMotion(
+            mass=self.mass,
+            c=c[:3],
+            J=J,
+            p=b1_[:3],
+            H=c[3:] + H_gimbal,
+            J_rate=J_rate,
+            p_rate=p_rate[:3],
+            H_rate=b1_[3:] + H_gimbal_rate,
+        )
+
+
+_PAIRS = (np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2]))  # of a symmetric matrix
+_SYMMETRIC = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])
+_SAMPLES = 2.0 * np.pi / 5.0 * np.arange(5)
+
+
+def _basis(x: Float[Array, " cmg"]) -> Float[Array, "3 cmg 5"]:
+    """1, cos x, sin x, cos 2x, sin 2x with their first and second derivatives by x."""
+    zero, cos, sin = jnp.zeros_like(x), jnp.cos(x), jnp.sin(x)
+    cos2, sin2 = cos * cos - sin * sin, 2.0 * sin * cos
+    return jnp.stack(
+        [
+            jnp.stack([zero + 1.0, cos, sin, cos2, sin2], axis=1),
+            jnp.stack([zero, -sin, cos, -2.0 * sin2, 2.0 * cos2], axis=1),
+            jnp.stack([zero, -cos, -sin, -4.0 * cos2, -4.0 * sin2], axis=1),
+        ]
+    )
+
+
+_FROM_SAMPLES = np.linalg.inv(
+    np.stack([0 * _SAMPLES + 1, *(trig(n * _SAMPLES) for n in (1, 2) for trig in (np.cos, np.sin))])
+).T
+
+
+def _contract(row, coefficients):
+    """Sum of a row (cmg x basis x basis) against coefficients, over units and bases."""
+    return row.reshape(-1) @ coefficients.reshape(-1, coefficients.shape[-1])
 
 
 def momentum_P(cluster: ControlMomentGyro, gamma: Float[Array, " cmg"]) -> Float[Array, "cmg 3"]:

@@ -78,9 +78,7 @@ class Load(eqx.Module):
     """One force and torque, applied at a point of a body, following a profile."""
 
     body: Literal["bus", "plate"] = eqx.field(static=True)
-    frame: Literal["body", "inertial"] = eqx.field(
-        static=True
-    )  # of force and torque
+    frame: Literal["body", "inertial"] = eqx.field(static=True)  # of force and torque
     force: Float[Array, "3"]  # [N]
     torque: Float[Array, "3"]  # [N m]
     point: Float[Array, "3"]  # [m] where the force acts, body frame

@@ -1,0 +1,11 @@
+from .api import QuietbusWarning as QuietbusWarning
+from .api import SimulationError as SimulationError
+from .api import compare as compare
+from .api import simulate as simulate
+from .results import load_run as load_run
+from .results import save_run as save_run
+from .results import scenario_of as scenario_of
+from .results import summarize as summarize
+from .scenario import Scenario as Scenario
+from .scenario import ScenarioError as ScenarioError
+from .scenario import load_scenario as load_scenario

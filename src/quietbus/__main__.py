@@ -1,0 +1,5 @@
+"""``python -m quietbus``."""
+
+from quietbus.cli import main
+
+main()

@@ -1,0 +1,53 @@
+"""What is left of a rate once the manoeuvre is over: jitter and slow remainder."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+RESOLVING = 2.56  # samples per period that a line needs to be seen, the practice of vibration test
+
+
+@dataclass(frozen=True)
+class Residual:
+    """Residual motion over the last part of a run, per axis."""
+
+    window: tuple[float, float]  # [s]
+    jitter_peak: np.ndarray  # (axis,) largest deviation from the slow motion
+    jitter_rms: np.ndarray  # (axis,)
+    slow: np.ndarray  # (axis,) largest value of the slow motion
+
+
+def residual(time: np.ndarray, signal: np.ndarray, window: float = 1.0) -> Residual:
+    """Split the last ``window`` [s] of a signal in slow motion and jitter.
+
+    The slow motion is the cubic that fits best; jitter is what remains. A cubic over one second
+    follows what an attitude loop does (below 1 Hz) and leaves a line at 10 Hz or more untouched.
+
+    Args:
+        time: (n,) [s], evenly spaced.
+        signal: (n, axis).
+
+    Raises:
+        ValueError: fewer than eight samples in the window.
+    """
+    last = time >= time[-1] - window
+    if np.count_nonzero(last) < 8:
+        raise ValueError(
+            f"the last {window:g} s hold {np.count_nonzero(last)} samples; a residual needs 8"
+        )
+    t, values = time[last], signal[last]
+    x = 2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0
+    basis = np.polynomial.legendre.legvander(x, 3)
+    slow = basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
+    jitter = values - slow
+    return Residual(
+        window=(float(t[0]), float(t[-1])),
+        jitter_peak=np.max(np.abs(jitter), axis=0),
+        jitter_rms=np.sqrt(np.mean(jitter**2, axis=0)),
+        slow=np.max(np.abs(slow), axis=0),
+    )
+
+
+def shows(output_rate: float, frequency: float) -> bool:
+    """Whether samples at ``output_rate`` [Hz] show a line at ``frequency`` [Hz]."""
+    return output_rate >= RESOLVING * frequency

@@ -1,0 +1,375 @@
+"""The ``quietbus`` command: arguments, progress bars and tables.
+
+Heavy modules are imported inside the commands, so that ``quietbus --help`` answers at once.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NoReturn
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from quietbus.results import Summary
+    from quietbus.scenario import Scenario
+
+BAD_INPUT, FAILED = 2, 1
+
+app = typer.Typer(
+    name="quietbus",
+    help="Design, simulate and verify vibration isolation platforms for CMGs on satellites.",
+    no_args_is_help=True,
+    pretty_exceptions_show_locals=False,
+    rich_markup_mode=None,
+)
+
+
+class Mount(StrEnum):
+    """How the upper plate is held."""
+
+    isolated = "isolated"
+    rigid = "rigid"
+
+
+class Method(StrEnum):
+    """How the motion is computed."""
+
+    direct = "direct"
+
+
+ScenarioArgument = Annotated[
+    str, typer.Argument(metavar="SCENARIO", help="A scenario file, or a built-in's name.")
+]
+DurationOption = Annotated[
+    str | None, typer.Option(help="Length of the run in s (or '2 min'), instead of the scenario's.")
+]
+FolderOption = Annotated[Path, typer.Option("-o", "--output", help="Folder for the results.")]
+
+
+def main() -> None:
+    """Entry point: one clear message for bad input, never a traceback."""
+    from quietbus.scenario import ScenarioError
+
+    try:
+        app()
+    except (ScenarioError, _BadInput) as error:
+        print(f"quietbus: {error}", file=sys.stderr)
+        sys.exit(BAD_INPUT)
+
+
+class _BadInput(Exception):
+    """Something that the user asked for and that cannot be; the message says what."""
+
+
+@app.command()
+def init(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The scenario file to write.")],
+) -> None:
+    """Write a commented scenario to start from."""
+    from quietbus.scenario import template_text
+
+    _check_folder(file.parent)
+    try:
+        with file.open("x", encoding="utf-8") as new:
+            new.write(template_text())
+    except FileExistsError:
+        raise _BadInput(f"{file}: exists already; choose another name") from None
+    except OSError as error:
+        raise _BadInput(f"{file}: cannot be written: {error.strerror}") from None
+    print(f"wrote {file}; next: quietbus compare {file}")
+
+
+@app.command()
+def simulate(
+    scenario: ScenarioArgument,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="NetCDF file; default NAME-MOUNT.nc, replaced if old."),
+    ] = None,
+    method: Annotated[Method, typer.Option(help="How to compute the motion.")] = Method.direct,
+    mount: Annotated[Mount | None, typer.Option(help="Instead of the scenario's mount.")] = None,
+    duration: DurationOption = None,
+    joint_forces: Annotated[
+        bool, typer.Option("--joint-forces", help="Also keep the forces in the legs' joints.")
+    ] = False,
+) -> None:
+    """Simulate a scenario; write the run and print what one wants to know of it."""
+    checked = _load(scenario, mount, duration)
+    _import_heavy()
+    from quietbus import api
+    from quietbus.results import save_run, summarize
+
+    chosen = checked.isolator.mount
+    output = output or Path(f"{checked.name}-{chosen}.nc")
+    _check_folder(output.parent)
+    if joint_forces and chosen == Mount.rigid:
+        raise _BadInput("--joint-forces needs the isolated mount: a rigid one leaves them open")
+    with _progress({chosen: checked.simulation.duration}) as tell, _notes():
+        try:
+            run = api.simulate(
+                checked, method.value, joint_forces=joint_forces, progress=lambda t: tell(chosen, t)
+            )
+        except api.SimulationError as error:
+            run = error.run
+        except KeyboardInterrupt:
+            _fail("interrupted before the first second was done; nothing to keep")
+    save_run(run, output)
+    if run.sizes["time"] > 1:
+        _print(_table({chosen: summarize(run)}))
+    print(f"wrote {output}")
+    if run.attrs["status"] != "complete":
+        _fail(f"the run is not complete: {run.attrs['stop_reason']}")
+
+
+@app.command()
+def compare(
+    scenario: ScenarioArgument,
+    output: FolderOption = Path("out"),
+    duration: DurationOption = None,
+) -> None:
+    """Simulate with the isolator and without, side by side, with pictures."""
+    checked = _load(scenario, None, duration)
+    _make_folder(output)
+    _import_heavy()
+    from quietbus import api
+    from quietbus.plots import compare_figures, run_figures, save_figures
+    from quietbus.results import save_run, summarize
+
+    with _progress(dict.fromkeys(Mount, checked.simulation.duration)) as tell, _notes():
+        try:
+            runs = api.compare(checked, progress=tell)
+        except KeyboardInterrupt:
+            _fail("interrupted before the first second was done; nothing to keep")
+    for mount, run in runs.items():
+        save_run(run, output / f"{mount}.nc")
+    broken = [f"{m}: {r.attrs['stop_reason']}" for m, r in runs.items() if r.attrs["stop_reason"]]
+    if all(run.sizes["time"] > 1 for run in runs.values()):
+        summaries = {str(mount): summarize(run) for mount, run in runs.items()}
+        _print(_table(summaries))
+        numbers = {mount: summary.to_dict() for mount, summary in summaries.items()}
+        (output / "summary.json").write_text(json.dumps(numbers, indent=2) + "\n")
+        figures = compare_figures(runs) | {
+            f"{mount}-{name}": figure
+            for mount, run in runs.items()
+            for name, figure in run_figures(run).items()
+        }
+        save_figures(figures, output)
+        print(f"wrote the runs, summary.json and {len(figures)} pictures to {output}/")
+    if broken:
+        _fail("not complete: " + "; ".join(broken))
+
+
+@app.command()
+def plot(
+    run: Annotated[Path, typer.Argument(metavar="RUN.nc", help="A run of `quietbus simulate`.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder; default RUN's name.")
+    ] = None,
+    suffix: Annotated[str, typer.Option("--format", help="png, svg or pdf.")] = "png",
+) -> None:
+    """Draw the pictures of a run."""
+    if suffix not in ("png", "svg", "pdf"):
+        raise _BadInput(f"--format: expected png, svg or pdf, got '{suffix}'")
+    from quietbus.plots import run_figures, save_figures
+    from quietbus.results import load_run
+
+    try:
+        loaded = load_run(run)
+    except (FileNotFoundError, ValueError) as error:
+        raise _BadInput(str(error)) from None
+    folder = output or run.with_suffix("")
+    _make_folder(folder)
+    for path in save_figures(run_figures(loaded), folder, f".{suffix}"):
+        print(f"wrote {path}")
+
+
+@app.command()
+def validate(
+    scenario: ScenarioArgument,
+    export: Annotated[
+        Path | None, typer.Option(help="Also write the satellite as a MuJoCo model (XML).")
+    ] = None,
+    mount: Annotated[Mount | None, typer.Option(help="Instead of the scenario's mount.")] = None,
+) -> None:
+    """Check a scenario against an independent engine (MuJoCo) and conservation laws."""
+    checked = _load(scenario, mount, None)
+    if export is not None:
+        _check_folder(export.parent)
+    _import_heavy()
+    from quietbus import validate as checking
+    from quietbus.build import build_initial_state, build_satellite
+
+    satellite = build_satellite(checked)
+    state = build_initial_state(checked, satellite)
+    try:
+        if export is not None:
+            export.write_text(checking.write_mjcf(satellite, state), encoding="utf-8")
+            print(f"wrote {export}")
+        with _status() as tell:
+            checks = checking.validate(satellite, state, progress=tell)
+    except ImportError as error:
+        _fail(str(error))
+    table = _new_table(f"{checked.name}, {checked.isolator.mount}: quietbus against MuJoCo")
+    for column, justify in (("check", "left"), ("error", "right"), ("bound", "right")):
+        table.add_column(column, justify=justify)  # type: ignore[arg-type]
+    table.add_column("verdict")
+    for check in checks:
+        verdict = "pass" if check.passed else "FAIL"
+        table.add_row(
+            f"{check.name}: {check.compares}", f"{check.error:.1e}", f"{check.bound:.0e}", verdict
+        )
+    _print(table)
+    failed = [check.name for check in checks if not check.passed]
+    if failed:
+        _fail(f"{len(failed)} of {len(checks)} checks failed: {', '.join(failed)}")
+    print(f"all {len(checks)} checks passed (errors are relative)")
+
+
+def _load(name: str, mount: Mount | None, duration: str | None) -> Scenario:
+    """The scenario with the command line's values instead of its own."""
+    from quietbus.scenario import load_scenario
+
+    overrides = {
+        "isolator.mount": mount and mount.value,
+        "simulation.duration": duration,
+    }
+    return load_scenario(name).with_overrides(
+        {key: value for key, value in overrides.items() if value is not None}
+    )
+
+
+def _import_heavy() -> None:
+    """JAX takes a second or two to load; say so."""
+    if sys.stderr.isatty():
+        with _status() as tell:
+            tell("loading JAX")
+            import quietbus.api
+    import quietbus.api  # noqa: F401
+
+
+def _table(summaries: Mapping[str, Summary]) -> Table:
+    """The numbers of one run, or of two side by side with their ratio."""
+    import numpy as np
+
+    both = len(summaries) == 2
+    first = next(iter(summaries.values()))
+    table = _new_table(f"Residual motion {first.residual_note}")
+    table.add_column("")
+    table.add_column("unit")
+    for mount in summaries:
+        table.add_column(mount, justify="right")
+    if both:
+        table.add_column("isolated / rigid", justify="right")
+
+    def row(name: str, unit: str, value: Callable[[Summary], float | None], ratio: bool) -> None:
+        values = [value(summary) for summary in summaries.values()]
+        cells = ["n/a" if v is None else f"{v:.4g}" for v in values]
+        if both:
+            known = ratio and None not in values and values[1]
+            cells.append(f"{100 * values[0] / values[1]:.3g} %" if known else "")  # type: ignore[operator]
+        table.add_row(name, unit, *cells)
+
+    degrees = lambda vector, i: None if vector is None else float(np.degrees(vector[i]))  # noqa: E731
+    for i, axis in enumerate("xyz"):
+        name = f"rate jitter {axis}, peak"
+        row(name, "deg/s", lambda s, i=i: degrees(s.residual_rate, i), True)  # type: ignore[misc]
+    for i, axis in enumerate("xyz"):
+        name = f"rate jitter {axis}, RMS"
+        row(name, "deg/s", lambda s, i=i: degrees(s.residual_rate_rms, i), True)  # type: ignore[misc]
+    for i, axis in enumerate("xyz"):
+        name = f"slow rate {axis}, peak"
+        row(name, "deg/s", lambda s, i=i: degrees(s.slow_rate, i), False)  # type: ignore[misc]
+    row("pointing error, last second", "deg", lambda s: float(np.degrees(s.pointing_error)), False)
+    row("peak gimbal rate", "deg/s", lambda s: float(np.degrees(s.peak_gimbal_rate)), False)
+    row("largest strut stroke", "mm", lambda s: 1e3 * s.peak_stroke, False)
+    row("largest strut force", "N", lambda s: s.peak_strut_force, False)
+    row("least singularity measure", "-", lambda s: s.minimum_singularity, False)
+    return table
+
+
+def _new_table(title: str) -> Table:
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    return Table(title=title, box=SIMPLE_HEAD, title_justify="left")
+
+
+def _print(table: Table) -> None:
+    from rich.console import Console
+
+    Console().print(table)
+
+
+@contextmanager
+def _progress(runs: Mapping[str, float]) -> Iterator[Callable[[str, float], None]]:
+    """A bar per run on standard error: simulated time, remaining time."""
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        TextColumn("{task.description:>22}"),
+        BarColumn(),
+        TextColumn("{task.completed:.0f} of {task.total:g} s"),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True)) as bars:
+        tasks = {run: bars.add_task(f"{run}: compiling", total=t) for run, t in runs.items()}
+
+        def tell(run: str, t: float) -> None:
+            bars.update(tasks[run], completed=t, description=run)
+
+        yield tell
+
+
+@contextmanager
+def _status() -> Iterator[Callable[[str], None]]:
+    """A line on standard error that says what is being done."""
+    from rich.console import Console
+
+    with Console(stderr=True).status("") as status:
+        yield lambda text: status.update(text)
+
+
+@contextmanager
+def _notes() -> Iterator[None]:
+    """Warnings of the package as notes on standard error, after the progress bars."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield
+    for warning in caught:
+        if warning.category.__name__ == "QuietbusWarning":
+            print(f"note: {warning.message}", file=sys.stderr)
+
+
+def _check_folder(folder: Path) -> None:
+    if not folder.is_dir():
+        raise _BadInput(f"{folder}: no such folder")
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _BadInput(f"{folder}: cannot be made: {error.strerror}") from None
+
+
+def _fail(message: str) -> NoReturn:
+    print(f"quietbus: {message}", file=sys.stderr)
+    raise typer.Exit(FAILED)

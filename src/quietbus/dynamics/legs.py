@@ -1,0 +1,118 @@
+"""Inertia of and forces on the legs in the satellite's twelve speeds.
+
+A leg's kinetic energy is that of two point masses at its ends, joined, plus what its direction s
+singles out (docs/theory.md):
+
+    2 T = a |v_U|^2 + 2 b v_U . v_A + d |v_A|^2
+          + (m_u - a) (s.v_U)^2 - 2 b (s.v_U)(s.v_A) + (m_d - d) (s.v_A)^2 + I_a w_s^2
+
+so its mass matrix is an isotropic part, made of 4 x 4 second moments of the joint positions, and
+three rows: the leg's line at U, its line at A, and its spin.
+"""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from quietbus.dynamics.kinematics import LegMotion, PlateMotion, leg_accelerations
+from quietbus.model.hexapod import Hexapod
+from quietbus.spatial.rotation import skew
+from quietbus.spatial.vector import cross, dot
+
+
+class JointFriction(eqx.Module):
+    """Viscous friction torques on the legs [N m], inertial components."""
+
+    at_U: Float[Array, "leg 3"]
+    at_A: Float[Array, "leg 3"]
+
+
+def joint_friction(legs: Hexapod, motion: LegMotion, plates: PlateMotion) -> JointFriction:
+    """``-c_s (w_leg - w_P)`` at the spherical joints, ``-c_u (w_leg - w_B)`` at the universal."""
+    return JointFriction(
+        -legs.spherical_friction[:, None] * (motion.w - plates.w_P),
+        -legs.universal_friction[:, None] * (motion.w - plates.w_B),
+    )
+
+
+def leg_mass_matrix(legs: Hexapod, motion: LegMotion) -> Float[Array, "12 12"]:
+    """Mass matrix of all legs on (v_P, w_P, v_B, w_B)."""
+    m_u, m_d, I_t, I_a = _masses(legs)
+    up, low = legs.upper.distance / motion.length, legs.lower.distance / motion.length
+    turning = I_t / motion.length**2
+    a = m_u * (1.0 - up) ** 2 + m_d * low**2 + turning
+    b = m_u * (1.0 - up) * up + m_d * (1.0 - low) * low - turning
+    d = m_u * up**2 + m_d * (1.0 - low) ** 2 + turning
+
+    one = jnp.ones_like(motion.s[:, :1])
+    z_U = jnp.concatenate([one, motion.r_U], axis=1)
+    z_A = jnp.concatenate([one, motion.r_A], axis=1)
+    weighted = jnp.concatenate([a[:, None] * z_U, b[:, None] * z_A, d[:, None] * z_A], axis=1)
+    moments = jnp.concatenate([z_U, z_A], axis=1).T @ weighted
+    PP, PB, BB = (_joined_points(S) for S in (moments[:4, :4], moments[:4, 4:8], moments[4:, 8:]))
+
+    line_U = jnp.concatenate([motion.s, cross(motion.r_U, motion.s)], axis=1)
+    line_A = jnp.concatenate([motion.s, cross(motion.r_A, motion.s)], axis=1)
+    by_v, by_w = motion.spin_by_velocity, motion.spin_by_bus_rate
+    spin = jnp.concatenate(
+        [by_v, cross(motion.r_U, by_v), -by_v, by_w - cross(motion.r_A, by_v)], axis=1
+    )
+    zero = jnp.zeros_like(line_U)
+    rows = jnp.concatenate(
+        [
+            jnp.concatenate([line_U, zero], axis=1),
+            jnp.concatenate([zero, line_A], axis=1),
+            spin,
+        ]
+    )
+    weighted_rows = jnp.concatenate(
+        [
+            jnp.concatenate([(m_u - a)[:, None] * line_U, -b[:, None] * line_A], axis=1),
+            jnp.concatenate([-b[:, None] * line_U, (m_d - d)[:, None] * line_A], axis=1),
+            I_a[:, None] * spin,
+        ]
+    )
+    return rows.T @ weighted_rows + jnp.block([[PP, PB], [PB.T, BB]])
+
+
+def leg_forces(legs: Hexapod, motion: LegMotion, plates: PlateMotion) -> Float[Array, "12"]:
+    """Forces of struts, friction and the legs' inertia at zero du/dt on (v_P, w_P, v_B, w_B)."""
+    m_u, m_d, I_t, I_a = (value[:, None] for value in _masses(legs))
+    zero = jnp.zeros(3)
+    bias = leg_accelerations(motion, plates, zero, zero, zero, zero)
+    friction = joint_friction(legs, motion, plates)
+    torque, s = friction.at_U + friction.at_A, motion.s
+    d_u, d_d = legs.upper.distance[:, None], legs.lower.distance[:, None]
+    upper = m_u * (bias.a_U - d_u * bias.s)
+    lower = m_d * (bias.a_A + d_d * bias.s)
+    # force on ds/dt: torques across the leg, and what its inertia asks for as the leg turns
+    across = cross(torque - I_a * motion.spin[:, None] * motion.s_rate, s)
+    across = across + d_u * upper - d_d * lower - I_t * bias.s
+    across = (across - dot(s, across)[:, None] * s) / motion.length[:, None]
+    about = (dot(torque, s) - I_a[:, 0] * bias.spin)[:, None]
+    strut = legs.strut_force(motion.length, motion.length_rate)[:, None]
+    between = across + about * motion.spin_by_velocity - strut * s
+    f_U, f_A = between - upper, -between - lower
+    t_P = cross(motion.r_U, f_U) - friction.at_U
+    t_B = cross(motion.r_A, f_A) - friction.at_A + about * motion.spin_by_bus_rate
+    return jnp.sum(jnp.concatenate([f_U, t_P, f_A, t_B], axis=1), axis=0)
+
+
+def _masses(legs: Hexapod) -> tuple[Float[Array, " leg"], ...]:
+    return (
+        legs.upper.mass,
+        legs.lower.mass,
+        legs.upper.transverse_inertia + legs.lower.transverse_inertia,
+        legs.upper.axial_inertia + legs.lower.axial_inertia,
+    )
+
+
+def _joined_points(S: Float[Array, "4 4"]) -> Float[Array, "6 6"]:
+    """Matrix on (v, w) x (v', w') of sum w_i v_i . v_i', from S = sum w_i (1, r_i)(1, r_i')^T."""
+    second = S[1:, 1:]
+    return jnp.block(
+        [
+            [S[0, 0] * jnp.eye(3), -skew(S[0, 1:])],
+            [skew(S[1:, 0]), jnp.trace(second) * jnp.eye(3) - second.T],
+        ]
+    )

@@ -1,0 +1,146 @@
+"""The base of every part of a scenario, and the types that its fields are made of."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, TypeVar
+
+import numpy as np
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
+
+from quietbus.scenario.checks import inertia_defect, listed
+from quietbus.scenario.errors import UnknownKey
+from quietbus.scenario.units import Quantity, expected
+
+T = TypeVar("T")
+ZERO = (0.0, 0.0, 0.0)
+
+
+class Part(BaseModel):
+    """A mapping of the scenario: its keys are known, its values do not change."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _check_keys(cls, data: Any) -> Any:
+        """Mark unknown keys, and let a missing field's own type say what it expects."""
+        if isinstance(data, cls):
+            return data
+        fields = cls.model_fields
+        if not isinstance(data, dict):
+            raise expected(f"a mapping with keys among {', '.join(fields)}", data)
+        required = {key: None for key, field in fields.items() if field.is_required()}
+        given = {
+            str(key): value if key in fields else UnknownKey(str(key), fields)
+            for key, value in data.items()
+        }
+        return required | given
+
+
+def listing(length: int | None, what: str, least: int = 1) -> BeforeValidator:
+    """Check that a value is a list of ``length``, or any from ``least`` on, before its items."""
+    wanted = f"a list of {length or ('one or more' if least else 'any number of')} {what}"
+
+    def check(value: Any) -> Any:
+        if isinstance(value, np.ndarray):
+            value = value.tolist()
+        if not isinstance(value, list | tuple):
+            raise expected(wanted, value)
+        if len(value) < least if length is None else len(value) != length:
+            raise expected(wanted, value, f"{len(value)} of them")
+        return value
+
+    return BeforeValidator(check)
+
+
+Vector = Annotated[tuple[T, T, T], listing(3, "numbers")]
+Matrix = Annotated[tuple[Vector[T], Vector[T], Vector[T]], listing(3, "rows")]
+Vectors = Annotated[tuple[Vector[T], ...], listing(None, "rows of 3 numbers")]
+Series = Annotated[tuple[T, ...], listing(None, "numbers")]
+
+
+# one value for all legs, or a list with a value for each
+PerLeg = Annotated[
+    Annotated[T, Tag("<all>")] | Annotated[tuple[T, ...], Tag("<each>")],
+    Discriminator(lambda value: "<each>" if isinstance(value, list | tuple) else "<all>"),
+]
+
+
+def _count(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+        raise expected("a count of at least 1", value)
+    return value
+
+
+def _unit_vector(value: tuple[float, float, float]) -> tuple[float, float, float]:
+    norm = float(np.linalg.norm(value))
+    if norm == 0.0:
+        raise expected("a unit vector", value, "its length is zero")
+    x, y, z = (component / norm for component in value)
+    if abs(norm - 1.0) > 1e-3:
+        offer = f"its length is {norm:.6g}; normalised: {listed((x, y, z), digits=10)}"
+        raise expected("a unit vector", value, offer)
+    # a vector that is normalised already stays as it is, so that reading it twice changes nothing
+    return value if abs(norm - 1.0) < 1e-15 else (x, y, z)
+
+
+def _inertia(
+    value: tuple[tuple[float, float, float], ...],
+) -> tuple[tuple[float, float, float], ...]:
+    defect = inertia_defect(value)
+    if defect is not None:
+        text = f"expected the inertia matrix of a rigid body in kg*m^2, but {defect}"
+        raise PydanticCustomError("scenario", "{text}", {"text": text})
+    return value
+
+
+Number = Annotated[float, Quantity("a plain number", "")]
+PositiveNumber = Annotated[float, Quantity("a plain number", "", above=0.0)]
+NonNegativeNumber = Annotated[float, Quantity("a plain number", "", least=0.0)]
+PositiveMass = Annotated[float, Quantity("a mass", "kg", above=0.0)]
+Mass = Annotated[float, Quantity("a mass", "kg", least=0.0)]
+Length = Annotated[float, Quantity("a length", "m")]
+Distance = Annotated[float, Quantity("a length", "m", least=0.0)]
+PositiveLength = Annotated[float, Quantity("a length", "m", above=0.0)]
+Time = Annotated[float, Quantity("a time", "s")]
+StartTime = Annotated[float, Quantity("a time", "s", least=0.0)]
+Duration = Annotated[float, Quantity("a time", "s", above=0.0)]
+Frequency = Annotated[float, Quantity("a frequency", "Hz", above=0.0)]
+Angle = Annotated[float, Quantity("an angle", "rad")]
+AngularVelocity = Annotated[float, Quantity("an angular velocity", "rad/s")]
+PositiveAngularVelocity = Annotated[float, Quantity("an angular velocity", "rad/s", above=0.0)]
+PositiveAngularAcceleration = Annotated[
+    float, Quantity("an angular acceleration", "rad/s^2", above=0.0)
+]
+PositiveAngularJerk = Annotated[float, Quantity("an angular jerk", "rad/s^3", above=0.0)]
+Force = Annotated[float, Quantity("a force", "N")]
+Torque = Annotated[float, Quantity("a torque", "N*m")]
+PositiveTorque = Annotated[float, Quantity("a torque", "N*m", above=0.0)]
+Stiffness = Annotated[float, Quantity("a stiffness", "N/m", above=0.0)]
+Damping = Annotated[float, Quantity("a damping", "N*s/m", least=0.0)]
+JointFriction = Annotated[float, Quantity("a joint friction", "N*m*s/rad", least=0.0)]
+Momentum = Annotated[float, Quantity("an angular momentum", "N*m*s")]
+Inertia = Annotated[float, Quantity("a moment of inertia", "kg*m^2")]
+MomentOfInertia = Annotated[float, Quantity("a moment of inertia", "kg*m^2", least=0.0)]
+PositiveInertia = Annotated[float, Quantity("a moment of inertia", "kg*m^2", above=0.0)]
+StaticImbalance = Annotated[float, Quantity("a static imbalance", "kg*m", least=0.0)]
+DynamicImbalance = Annotated[float, Quantity("a dynamic imbalance", "kg*m^2", least=0.0)]
+ProportionalGain = Annotated[float, Quantity("a proportional gain", "N*m/rad", least=0.0)]
+IntegralGain = Annotated[float, Quantity("an integral gain", "N*m/(rad*s)", least=0.0)]
+DerivativeGain = Annotated[float, Quantity("a derivative gain", "N*m*s/rad", least=0.0)]
+Zero = Annotated[float, Quantity("a zero of the controller", "1/s", least=0.0)]
+UnitCount = Annotated[int, BeforeValidator(_count)]
+UnitVector = Annotated[Vector[Number], AfterValidator(_unit_vector)]
+UnitVectors = Annotated[tuple[UnitVector, ...], listing(None, "unit vectors")]
+InertiaMatrix = Annotated[Matrix[Inertia], AfterValidator(_inertia)]
+Text = Annotated[str, Field(min_length=1)]

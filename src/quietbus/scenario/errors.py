@@ -1,0 +1,119 @@
+"""What is wrong with a scenario, told in the user's terms: file, field, line, what was expected."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
+
+from quietbus.scenario.units import shown
+
+Path = tuple[str | int, ...]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing wrong with a scenario.
+
+    Attributes:
+        message: what was expected and what came.
+        path: the field, from the top of the scenario; empty for the whole.
+        line: line in the file, counted from 1, if there is one.
+    """
+
+    message: str
+    path: Path = ()
+    line: int | None = None
+
+    def __str__(self) -> str:
+        where = dotted(self.path)
+        if self.line is not None:
+            where = f"{where} (line {self.line})" if where else f"line {self.line}"
+        return f"{where}: {self.message}" if where else self.message
+
+
+class ScenarioError(ValueError):
+    """A scenario that cannot be used; its text has one line for each problem.
+
+    Attributes:
+        source: file or name of the scenario.
+        problems: everything found wrong.
+    """
+
+    def __init__(self, source: str, problems: Iterable[Problem]) -> None:
+        self.source = source
+        self.problems = tuple(problems)
+        super().__init__("\n".join(f"{source}: {problem}" for problem in self.problems))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.source, self.problems)  # an exception's own way keeps one text
+
+
+class Findings:
+    """Problems that a check of several fields together has found."""
+
+    def __init__(self) -> None:
+        self._errors: list[InitErrorDetails] = []
+
+    def add(self, path: Path | str, message: str) -> None:
+        """Note a problem of the field at ``path`` below the checked model."""
+        loc = (path,) if isinstance(path, str) else path
+        kind = PydanticCustomError("scenario", "{text}", {"text": message})
+        self._errors.append(InitErrorDetails(type=kind, loc=loc, input=None))
+
+    def include(self, path: Path, error: ValidationError) -> None:
+        """Take over the problems of a model that belongs at ``path``."""
+        for problem in found(error):
+            self.add((*path, *problem.path), problem.message)
+
+    def raise_any(self) -> None:
+        """Report what was noted to pydantic, which merges it with all else."""
+        if self._errors:
+            raise ValidationError.from_exception_data("scenario", self._errors)
+
+
+class UnknownKey:
+    """Stands in for the value of a key that a model does not have, until it is reported."""
+
+    def __init__(self, key: str, known: Iterable[str]) -> None:
+        known = list(known)
+        close = difflib.get_close_matches(key, known, n=1)
+        hint = f"did you mean '{close[0]}'?" if close else f"known here: {', '.join(known)}"
+        self.message = f"unknown key '{key}'; {hint}"
+
+
+def found(
+    error: ValidationError, line_of: Callable[[Path], int | None] | None = None
+) -> list[Problem]:
+    """Pydantic's findings as problems, in the order of the file."""
+    problems: dict[Problem, None] = {}  # an ordered set
+    for details in error.errors(include_url=False):
+        # elements like "<each>" name the branch of a union, not a field
+        path = tuple(key for key in details["loc"] if not str(key).startswith("<"))
+        problems[Problem(_message(details), path, line_of(path) if line_of else None)] = None
+    return sorted(problems, key=lambda problem: problem.line or 0)
+
+
+def _message(details: ErrorDetails) -> str:
+    value = details["input"]
+    match details["type"]:
+        case "scenario":
+            return details["msg"]
+        case "extra_forbidden" if isinstance(value, UnknownKey):
+            return value.message
+        case "literal_error":
+            return f"expected {details['ctx']['expected']}, got {shown(value)}"
+        case "string_type":
+            return f"expected a text, got {shown(value)}"
+        case _:
+            return f"{details['msg']}, got {shown(value)}"
+
+
+def dotted(path: Path) -> str:
+    """A path as text: ``cluster.units[2].position``."""
+    text = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path)
+    return text.removeprefix(".")

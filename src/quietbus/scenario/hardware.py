@@ -1,0 +1,387 @@
+"""The scenario's mechanical parts: bus, isolator and CMG cluster."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
+
+from quietbus.scenario.base import (
+    ZERO,
+    Angle,
+    AngularVelocity,
+    Damping,
+    Distance,
+    DynamicImbalance,
+    InertiaMatrix,
+    JointFriction,
+    Length,
+    Mass,
+    MomentOfInertia,
+    Momentum,
+    Part,
+    PerLeg,
+    PositiveAngularAcceleration,
+    PositiveAngularVelocity,
+    PositiveInertia,
+    PositiveLength,
+    PositiveMass,
+    Series,
+    StaticImbalance,
+    Stiffness,
+    UnitCount,
+    UnitVector,
+    UnitVectors,
+    Vector,
+    Vectors,
+    listing,
+)
+from quietbus.scenario.checks import free_directions, inertia_defect, listed
+from quietbus.scenario.errors import Findings
+
+
+class Bus(Part):
+    """The satellite without its platform."""
+
+    mass: PositiveMass
+    inertia: InertiaMatrix  # about the mass centre, bus axes
+
+
+class Plate(Part):
+    """The upper plate without its CMGs."""
+
+    mass: PositiveMass
+    inertia: InertiaMatrix  # about its mass centre, upper-plate axes
+    center_of_mass: Vector[Length] = ZERO  # upper-plate frame
+
+
+class LegPart(Part):
+    """The lower or the upper part of a leg; all zero for a massless one."""
+
+    mass: Mass
+    distance: Distance  # from the joint at this part's end to its mass centre
+    transverse_inertia: MomentOfInertia
+    axial_inertia: MomentOfInertia
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        findings = Findings()
+        if self.axial_inertia > 2.0 * self.transverse_inertia * (1.0 + 1e-6):
+            findings.add(
+                "axial_inertia",
+                "expected at most twice the transverse inertia, "
+                f"as every body has it, got {self.axial_inertia:g} kg*m^2",
+            )
+        findings.raise_any()
+        return self
+
+
+class Legs(Part):
+    """The legs; what is not a matrix is one value for all legs or a list with one for each."""
+
+    upper_joints: Vectors[Length]  # upper-plate frame
+    lower_joints: Vectors[Length]  # base-plate frame
+    universal_axes: UnitVectors  # base-plate frame
+    stiffness: PerLeg[Stiffness]
+    damping: PerLeg[Damping]
+    free_length: PerLeg[PositiveLength] | None = None  # None: as the nominal pose has it
+    upper_part: PerLeg[LegPart]
+    lower_part: PerLeg[LegPart]
+    spherical_friction: PerLeg[JointFriction] = 0.0
+    universal_friction: PerLeg[JointFriction] = 0.0
+
+    @property
+    def count(self) -> int:
+        """Number of legs."""
+        return len(self.upper_joints)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        findings = Findings()
+        if self.count < 3:
+            findings.add("upper_joints", f"expected at least 3 legs, got {self.count}")
+        for key in type(self).model_fields:
+            value = getattr(self, key)
+            if isinstance(value, tuple) and len(value) != self.count:
+                findings.add(
+                    key,
+                    f"expected {self.count} entries, one for each of upper_joints, "
+                    f"got {len(value)}",
+                )
+        findings.raise_any()
+        return self
+
+
+class Isolator(Part):
+    """The platform: base plate fixed to the bus, legs, upper plate."""
+
+    mount: Literal["isolated", "rigid"] = "isolated"
+    offset: Vector[Length]  # base-plate centre in the bus frame
+    orientation: Vector[Angle] = ZERO  # [roll, pitch, yaw] of the base plate in the bus
+    separation: Length  # of the upper-plate frame above the base-plate frame, nominal pose
+    plate: Plate
+    legs: Legs
+
+    def joints(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper joints (n x 3) [m] in the base-plate frame, nominal pose."""
+        lower, upper = np.array(self.legs.lower_joints), np.array(self.legs.upper_joints)
+        return lower, upper + np.array([0.0, 0.0, self.separation])
+
+    @model_validator(mode="after")
+    def _check_geometry(self) -> Self:
+        findings = Findings()
+        lower, upper = self.joints()
+        lengths = np.linalg.norm(upper - lower, axis=1)
+        for leg in np.flatnonzero(lengths < 1e-9).tolist():
+            findings.add(
+                ("legs", "upper_joints", leg),
+                f"leg {leg} has zero length: its joints coincide in the nominal pose",
+            )
+        findings.raise_any()
+        directions = (upper - lower) / lengths[:, None]
+        for leg, (s, k) in enumerate(zip(directions, self.legs.universal_axes, strict=True)):
+            if abs(s @ np.array(k)) > 0.999:
+                findings.add(
+                    ("legs", "universal_axes", leg),
+                    f"expected an axis across the leg, got {listed(k)}, which is parallel to "
+                    f"leg {leg} ({listed(s)}): the universal joint would lock",
+                )
+            for other in range(leg):
+                same = [abs(ends[leg] - ends[other]).max() < 1e-9 for ends in (lower, upper)]
+                if all(same):
+                    findings.add(
+                        ("legs", "upper_joints", leg),
+                        f"leg {leg} is leg {other} again: upper and lower joint are the same",
+                    )
+        free = free_directions(lower, upper)
+        if free:
+            findings.add(
+                ("legs",),
+                f"expected legs that hold the plate in all six directions; these {len(lower)} "
+                f"leave free: {'; '.join(free)} (base-plate frame)",
+            )
+        findings.raise_any()
+        return self
+
+
+class GimbalBody(Part):
+    """The gimbal without the rotor."""
+
+    mass: PositiveMass
+    inertia: Vector[PositiveInertia]  # about spin, transverse and gimbal axes, mass centre
+    center_of_mass: Vector[Length] = ZERO  # from the unit's position; gimbal axes (s, t, g)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        findings = Findings()
+        defect = inertia_defect(np.diag(self.inertia))
+        if defect:
+            findings.add("inertia", f"expected the principal inertia of a rigid body, but {defect}")
+        findings.raise_any()
+        return self
+
+
+class InstallationError(Part):
+    """Small turn of the rotor's bearing against the gimbal, about g, t and s."""
+
+    alpha: Angle = 0.0
+    beta: Angle = 0.0
+    chi: Angle = 0.0
+
+
+class Rotor(Part):
+    """A rotor at constant speed; exactly one of `momentum` and `spin_inertia` is given."""
+
+    mass: PositiveMass
+    momentum: Momentum | None = None
+    spin_inertia: PositiveInertia | None = None
+    speed: AngularVelocity
+    transverse_inertia: PositiveInertia
+    static_imbalance: StaticImbalance = 0.0
+    dynamic_imbalance: DynamicImbalance = 0.0
+    dynamic_imbalance_phase: Angle = 0.0  # in the rotor plane, from the static imbalance
+    installation_error: InstallationError = InstallationError()
+    offset: Vector[Length] = ZERO  # gimbal mass centre to rotor centre; gimbal axes (s, t, g)
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """Inertia [kg m^2] about the mass centre: x along spin, y along the static imbalance."""
+        if self.spin_inertia is not None:
+            spin = self.spin_inertia
+        else:
+            assert self.momentum is not None  # checked below
+            spin = self.momentum / self.speed
+        xy = self.dynamic_imbalance * np.cos(self.dynamic_imbalance_phase)
+        xz = self.dynamic_imbalance * np.sin(self.dynamic_imbalance_phase)
+        across = self.transverse_inertia
+        return np.array([[spin, -xy, -xz], [-xy, across, 0.0], [-xz, 0.0, across]])
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        findings = Findings()
+        if (self.momentum is None) == (self.spin_inertia is None):
+            got = "neither" if self.momentum is None else "both"
+            findings.add((), f"expected exactly one of momentum and spin_inertia, got {got}")
+        elif self.momentum is not None and self.momentum * self.speed <= 0.0:
+            if self.speed == 0.0:
+                findings.add(
+                    "speed",
+                    "expected a speed other than 0: a rotor at rest is described "
+                    "by spin_inertia instead of momentum",
+                )
+            else:
+                findings.add(
+                    "momentum",
+                    "expected a momentum with the sign of the speed "
+                    f"({self.speed:g} rad/s), got {self.momentum:g} N*m*s",
+                )
+        findings.raise_any()
+        defect = inertia_defect(self.inertia)
+        if defect:
+            findings.add(
+                "transverse_inertia",
+                "expected, with the spin inertia "
+                f"{self.inertia[0, 0]:.6g} kg*m^2 and the dynamic imbalance, the inertia "
+                f"of a rigid body, but {defect}",
+            )
+        findings.raise_any()
+        return self
+
+
+class Pyramid(Part):
+    """Units around the plate's z axis, gimbal axes leaning outwards from it by `skew`."""
+
+    skew: Angle
+    radius: Distance
+    height: Length = 0.0
+    units: UnitCount = 4
+
+
+class Unit(Part):
+    """One CMG placed at will, upper-plate frame."""
+
+    position: Vector[Length]
+    gimbal_axis: UnitVector
+    spin_axis: UnitVector  # at zero gimbal angle
+    gimbal_body: GimbalBody | None = None  # None: the cluster's
+    rotor: Rotor | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        findings = Findings()
+        g, s = np.array(self.gimbal_axis), np.array(self.spin_axis)
+        across = s - (s @ g) * g
+        if np.linalg.norm(across) < 1e-3:
+            findings.add(
+                "spin_axis",
+                "expected an axis across the gimbal axis, got "
+                f"{listed(s)}, which is parallel to it",
+            )
+        elif abs(s @ g) > 1e-3:
+            across /= np.linalg.norm(across)
+            findings.add(
+                "spin_axis",
+                "expected an axis at right angles to the gimbal axis, got "
+                f"{listed(s)}; projected: {listed(across, digits=10)}",
+            )
+        findings.raise_any()
+        return self
+
+
+class Cluster(Part):
+    """The CMGs: a pyramid, or a list of units with what differs from the common parts."""
+
+    pyramid: Pyramid | None = None
+    units: Annotated[tuple[Unit, ...], listing(None, "units")] | None = None
+    gimbal_body: GimbalBody
+    rotor: Rotor
+    rotor_phases: Series[Angle] | None = None  # rotor angles at the start; None: zeros
+    gimbal_angles: Series[Angle] | None = None
+    gimbal_bandwidth: PositiveAngularVelocity  # of the first-order rate servo
+    gimbal_rate_limit: PositiveAngularVelocity | None = None
+    gimbal_acceleration_limit: PositiveAngularAcceleration | None = None
+
+    @property
+    def count(self) -> int:
+        """Number of CMGs."""
+        if self.pyramid is not None:
+            return self.pyramid.units
+        return len(self.units or ())
+
+    def placed(self) -> tuple[Unit, ...]:
+        """All CMGs as units, each with its gimbal body and rotor.
+
+        Unit j of a pyramid of n stands at the azimuth 2 pi j / n.
+        """
+        bodies = {"gimbal_body": self.gimbal_body, "rotor": self.rotor}
+        if self.pyramid is None:
+            return tuple(
+                unit.model_copy(update={key: getattr(unit, key) or bodies[key] for key in bodies})
+                for unit in self.units or ()
+            )
+        z, units = np.array([0.0, 0.0, 1.0]), []
+        for azimuth in 2.0 * np.pi * np.arange(self.count) / self.count:
+            r = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+            units.append(
+                Unit(
+                    position=self.pyramid.radius * r + self.pyramid.height * z,
+                    gimbal_axis=np.sin(self.pyramid.skew) * r + np.cos(self.pyramid.skew) * z,
+                    spin_axis=np.cross(z, r),
+                    gimbal_body=self.gimbal_body,
+                    rotor=self.rotor,
+                )
+            )
+        return tuple(units)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _complete_units(cls, data: Any) -> Any:
+        """Merge what a unit says about its rotor and gimbal body onto the common ones."""
+        if not (isinstance(data, dict) and isinstance(data.get("units"), list | tuple)):
+            return data
+        return data | {"units": [_completed(unit, data) for unit in data["units"]]}
+
+    @model_serializer(mode="wrap")
+    def _shorten_units(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out what a unit has in common, so that an override of that reaches the unit."""
+        data: dict[str, Any] = handler(self)
+        for unit in data["units"] or ():
+            for key in ("gimbal_body", "rotor"):
+                if unit[key] is not None:
+                    common = data[key]
+                    unit[key] = {k: v for k, v in unit[key].items() if v != common[k]}
+        return data
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        findings = Findings()
+        if (self.pyramid is None) == (self.units is None):
+            got = "neither" if self.units is None else "both"
+            findings.add((), f"expected exactly one of pyramid and units, got {got}")
+        findings.raise_any()
+        for key in ("rotor_phases", "gimbal_angles"):
+            values = getattr(self, key)
+            if values is not None and len(values) != self.count:
+                findings.add(
+                    key, f"expected {self.count} angles, one for each CMG, got {len(values)}"
+                )
+        findings.raise_any()
+        return self
+
+
+def _completed(unit: Any, cluster: dict[str, Any]) -> Any:
+    """A unit's data with its partial overrides filled up from the cluster's."""
+    if not isinstance(unit, dict):
+        return unit
+    whole = dict(unit)
+    for key in ("gimbal_body", "rotor"):
+        common, own = cluster.get(key), unit.get(key)
+        if isinstance(own, dict) and isinstance(common, Part):
+            common = common.model_dump(exclude_none=True)
+        if isinstance(own, dict) and isinstance(common, dict):
+            # momentum and spin inertia are two ways to say one thing: the unit's own one holds
+            either = {"momentum", "spin_inertia"}
+            replaced = either if own.keys() & either else set()
+            whole[key] = {k: v for k, v in common.items() if k not in replaced} | own
+    return whole

@@ -1,0 +1,59 @@
+"""Scenarios from files and the built-in ones."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import pathlib
+from importlib.resources import files
+
+from quietbus.scenario.errors import Problem, ScenarioError
+from quietbus.scenario.schema import Scenario
+
+_BUILTIN = files("quietbus.scenario") / "builtin"
+
+
+def builtin_names() -> list[str]:
+    """Names of the built-in scenarios."""
+    names = (entry.name for entry in _BUILTIN.iterdir())
+    return sorted(name.removesuffix(".yaml") for name in names if name.endswith(".yaml"))
+
+
+def builtin_text(name: str) -> str:
+    """YAML text of a built-in scenario, with its comments."""
+    return (_BUILTIN / f"{name}.yaml").read_text(encoding="utf-8")
+
+
+def template_text() -> str:
+    """A commented scenario to start from."""
+    return builtin_text("zhang2012").replace("name: zhang2012", "name: my-satellite", 1)
+
+
+def load_scenario(path_or_name: str | os.PathLike[str]) -> Scenario:
+    """Scenario from a YAML file, or a built-in one by its name.
+
+    A built-in's name wins over a file of that name; write ``./name`` for the file. Raises
+    ScenarioError, also if the file cannot be read.
+    """
+    source = os.fspath(path_or_name)
+    if source in builtin_names():
+        return Scenario.from_yaml(builtin_text(source), source)
+    try:
+        text = pathlib.Path(source).read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise ScenarioError(source, [Problem(_not_found(source))]) from None
+    except UnicodeDecodeError as error:
+        raise ScenarioError(source, [Problem(f"not a UTF-8 text file: {error}")]) from None
+    except (OSError, ValueError) as error:  # ValueError: a null character in the name
+        why = getattr(error, "strerror", None) or str(error)
+        raise ScenarioError(source, [Problem(f"cannot be read: {why}")]) from None
+    return Scenario.from_yaml(text, source)
+
+
+def _not_found(source: str) -> str:
+    names = builtin_names()
+    close = difflib.get_close_matches(source, names, n=1)
+    hint = f" (did you mean {close[0]}?)" if close else ""
+    return (
+        f"no such file, and no built-in scenario of that name{hint}; built in: {', '.join(names)}"
+    )

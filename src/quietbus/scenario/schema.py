@@ -1,0 +1,116 @@
+"""The scenario as a whole: checked, unchangeable, in SI units."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, Self
+
+from pydantic import BeforeValidator, ValidationError
+
+from quietbus.scenario.base import Duration, Frequency, Part, PositiveNumber, Text, listing
+from quietbus.scenario.control import Control, Initial, Load, Target
+from quietbus.scenario.errors import Path, Problem, ScenarioError, dotted, found
+from quietbus.scenario.hardware import Bus, Cluster, Isolator
+from quietbus.scenario.text import read_yaml, write_yaml
+
+
+class Tolerances(Part):
+    """Error control of the integrator."""
+
+    relative: PositiveNumber = 1e-8
+    absolute: PositiveNumber = 1e-10
+
+
+class Simulation(Part):
+    """Length of a run and how finely it is kept."""
+
+    duration: Duration = 100.0
+    output_rate: Frequency = 1000.0
+    tolerances: Tolerances = Tolerances()
+
+
+def _none_word(value: Any) -> Any:
+    return None if value == "none" else value
+
+
+def _without_nulls(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {key: _without_nulls(value) for key, value in data.items() if value is not None}
+    return [_without_nulls(item) for item in data] if isinstance(data, list) else data
+
+
+class Scenario(Part):
+    """Everything that a run depends on; all values SI.
+
+    Made from YAML by ``from_yaml`` or ``quietbus.load_scenario``, from Python data by
+    ``from_dict``. Scenarios compare by value and do not change; ``with_overrides`` gives a
+    changed copy.
+    """
+
+    name: Text
+    bus: Bus
+    isolator: Isolator
+    cluster: Cluster
+    control: Annotated[Control | None, BeforeValidator(_none_word)] = None
+    initial: Initial = Initial()
+    target: Target = Target()
+    loads: Annotated[tuple[Load, ...], listing(None, "loads", least=0)] = ()
+    simulation: Simulation = Simulation()
+
+    @classmethod
+    def from_yaml(cls, text: str, source: str = "<text>") -> Self:
+        """Scenario from YAML text; ScenarioError lists all problems, with lines of ``source``."""
+        data, line_of = read_yaml(text, source)
+        return cls._checked(data, source, line_of)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any], source: str = "<data>") -> Self:
+        """Scenario from nested dicts and lists as the YAML file has them."""
+        return cls._checked(data, source)
+
+    @classmethod
+    def _checked(
+        cls, data: Any, source: str, line_of: Callable[[Path], int | None] | None = None
+    ) -> Self:
+        try:
+            return cls.model_validate(data)
+        except ValidationError as error:
+            raise ScenarioError(source, found(error, line_of)) from None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Nested dicts and lists, SI numbers; all values are there, also the defaults."""
+        data = self.model_dump(mode="json")
+        data["control"] = data["control"] or "none"
+        return _without_nulls(data)
+
+    def to_yaml(self) -> str:
+        """YAML text in SI units that gives this scenario again."""
+        return write_yaml(self.to_dict())
+
+    def with_overrides(self, overrides: Mapping[str, Any]) -> Self:
+        """A checked copy with some fields changed.
+
+        Args:
+            overrides: values by dotted path, with units if wanted:
+                ``{"isolator.mount": "rigid", "cluster.units[2].rotor.speed": "5900 rpm"}``.
+        """
+        data = self.to_dict()
+        for path, value in overrides.items():
+            self._set(data, path, value)
+        return self.from_dict(data, source=f"{self.name} with overrides")
+
+    def _set(self, data: Any, path: str, value: Any) -> None:
+        keys: list[str | int] = [
+            int(key) if key.isdigit() else key for key in re.findall(r"[^.\[\]]+", path) or [""]
+        ]
+        for depth, key in enumerate(keys):
+            inner = isinstance(data, dict) and isinstance(key, str)
+            if not inner and not (isinstance(data, list) and key in range(len(data))):
+                above = dotted(tuple(keys[:depth])) or "the scenario"
+                problem = Problem(f"cannot be set, because {above} has no such entry", tuple(keys))
+                raise ScenarioError(f"{self.name} with overrides", [problem])
+            if depth == len(keys) - 1:
+                data[key] = value
+            else:
+                data = data.setdefault(key, {}) if isinstance(data, dict) else data[key]

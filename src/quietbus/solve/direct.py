@@ -1,0 +1,222 @@
+"""The direct solver: the nonlinear equations in time, every rotor turn resolved.
+
+Diffrax's Dopri8 with error control, in pieces of one second so that progress can be shown, a run
+can be stopped, and the step sequence does not depend on the output rate.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.flatten_util import ravel_pytree
+from jaxtyping import Array, Float
+
+from quietbus.dynamics.closed_loop import state_rate
+from quietbus.dynamics.outputs import Outputs, geometry_margin, outputs
+from quietbus.dynamics.state import State
+from quietbus.model.cmg import ClusterMoments
+from quietbus.model.satellite import Satellite
+from quietbus.spatial.rotation import (
+    quaternion_multiply,
+    quaternion_normalize,
+    quaternion_to_matrix,
+)
+
+PIECE = 1.0  # [s] integrated between two looks at the clock
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """Error control of the integrator, on the root mean square over the state in SI units."""
+
+    relative: float = 1e-8
+    absolute: float = 1e-10
+
+
+@dataclass(frozen=True)
+class DirectSolution:
+    """A run, whole or up to where it stopped."""
+
+    time: np.ndarray  # (n,) [s]
+    outputs: Outputs  # NumPy arrays with time as the first axis
+    final: State  # at the end of the last whole piece
+    steps: int
+    rejected: int
+    stopped: str | None  # why the run ended early, None if it did not
+    interrupted: bool  # the user stopped it
+
+
+def integrate(
+    satellite: Satellite,
+    initial: State,
+    duration: float,
+    output_rate: float,
+    tolerances: Tolerances | None = None,
+    with_joint_forces: bool = False,
+    progress: Callable[[float], None] | None = None,
+) -> DirectSolution:
+    """Integrate from t = 0 to ``duration`` [s], with outputs every 1/``output_rate`` [Hz].
+
+    A run that diverges or leaves the legs' geometry, and one that the user interrupts, returns
+    what it has computed and says why it stopped.
+
+    Args:
+        progress: called with the time reached [s] after every piece.
+    """
+    tolerances = tolerances or Tolerances()
+    count = int(np.floor(duration * output_rate * (1.0 + 1e-12))) + 1
+    time = np.arange(count) / output_rate
+    size = int(np.ceil(PIECE * output_rate)) + 1
+    store: list[np.ndarray] = []
+    state, t, done = initial, 0.0, 0
+    steps = rejected = 0
+    step = 1e-4
+    stopped, interrupted = None, False
+    try:
+        while done < count or t < duration:
+            end = min(PIECE * round(t / PIECE + 1.0), duration)
+            last = count if end == duration else int(np.searchsorted(time, end))
+            due = time[done:last]
+            ts = np.full(size, end)
+            ts[: len(due)] = due
+            piece = _piece(satellite, state, t, end, step, ts, tolerances, with_joint_forces)
+            arrays = jax.tree.leaves(piece.outputs)
+            if not store:
+                store = [np.empty((count, *leaf.shape[1:])) for leaf in arrays]
+            valid = int(np.sum(np.asarray(piece.valid)[: len(due)]))
+            for whole, part in zip(store, arrays, strict=True):
+                whole[done : done + valid] = part[:valid]
+            done += valid
+            steps, rejected = steps + int(piece.steps), rejected + int(piece.rejected)
+            stopped = _reason(piece)
+            if stopped:
+                break
+            state, t = piece.final, end
+            step = 0.9 * PIECE / max(int(piece.steps) - int(piece.rejected), 1)
+            if progress is not None:
+                progress(t)
+    except KeyboardInterrupt:
+        stopped, interrupted = f"interrupted by the user at t = {t:g} s", True
+    if not store:
+        raise KeyboardInterrupt
+    structure = jax.tree.structure(piece.outputs)
+    kept = jax.tree.unflatten(structure, [whole[:done] for whole in store])
+    return DirectSolution(time[:done], kept, state, steps, rejected, stopped, interrupted)
+
+
+class _Piece(eqx.Module):
+    outputs: Outputs
+    valid: Array  # which output instants were reached
+    final: State
+    time_reached: Float[Array, ""]
+    margin: Float[Array, ""]
+    finite: Array
+    success: Array
+    steps: Array
+    rejected: Array
+
+
+def _piece(satellite, state, t0, t1, step, ts, tolerances, with_joint_forces) -> _Piece:
+    numbers = (t0, t1, step, ts, tolerances.relative, tolerances.absolute)
+    arrays = tuple(jnp.asarray(number) for number in numbers)
+    return jax.block_until_ready(_compiled_piece(satellite, state, arrays, with_joint_forces))
+
+
+@eqx.filter_jit
+def _compiled_piece(satellite, state, numbers, with_joint_forces) -> _Piece:
+    t0, t1, step, ts, rtol, atol = numbers
+    moments = ClusterMoments.expand(satellite.cluster)
+    y0, unravel = ravel_pytree(state)
+
+    @jax.jit  # traced once for the integrator's many uses of it
+    def rate(t, y, args):  # noqa: ARG001
+        return ravel_pytree(state_rate(satellite, t, unravel(y), None, moments))[0]
+
+    def left_geometry(t, y, args, **kwargs):  # noqa: ARG001
+        return geometry_margin(satellite, unravel(y)) <= 0.0
+
+    controller = diffrax.PIDController(rtol=rtol, atol=atol, dtmin=1e-9)
+    corners = [load.profile.corners for load in satellite.loads]
+    if sum(len(corner) for corner in corners):
+        jumps = jnp.sort(jnp.concatenate(corners))
+        controller = diffrax.ClipStepSizeController(controller, jump_ts=jumps)
+    solution = diffrax.diffeqsolve(
+        diffrax.ODETerm(rate),
+        diffrax.Dopri8(),
+        t0,
+        t1,
+        jnp.minimum(step, t1 - t0),
+        y0,
+        saveat=diffrax.SaveAt(subs=[diffrax.SubSaveAt(ts=ts), diffrax.SubSaveAt(t1=True)]),
+        stepsize_controller=controller,
+        event=diffrax.Event(left_geometry),
+        adjoint=diffrax.ForwardMode(),
+        max_steps=None,
+        throw=False,
+    )
+    saved, (last,) = solution.ys
+    valid = jnp.all(jnp.isfinite(saved), axis=1)
+    states = jax.vmap(unravel)(saved)
+    reported = jax.vmap(lambda t, s: outputs(satellite, t, _tidy(satellite, s), with_joint_forces))
+    final = _tidy(satellite, unravel(last))
+    return _Piece(
+        outputs=reported(ts, states),
+        valid=valid,
+        final=final,
+        time_reached=solution.ts[1][0],
+        margin=geometry_margin(satellite, final),
+        finite=jnp.all(jnp.isfinite(last)),
+        success=solution.result == diffrax.RESULTS.successful,
+        steps=solution.stats["num_steps"],
+        rejected=solution.stats["num_rejected_steps"],
+    )
+
+
+def _tidy(satellite: Satellite, state: State) -> State:
+    """The state with unit quaternions, and on a rigid mount with the plate where the bus holds it.
+
+    Both hold exactly in the equations; this removes the integrator's drift.
+    """
+    q_NB, q_NP = quaternion_normalize(state.q_NB), quaternion_normalize(state.q_NP)
+    p_NP_N, v_NP_N, w_NP_P = state.p_NP_N, state.v_NP_N, state.w_NP_P
+    if satellite.mount == "rigid":
+        R_NB = quaternion_to_matrix(q_NB)
+        q_NP = quaternion_multiply(q_NB, satellite.q_BP)
+        p_NP_N = state.p_NB_N + R_NB @ satellite.p_BP_B
+        v_NP_N = state.v_NB_N + R_NB @ jnp.cross(state.w_NB_B, satellite.p_BP_B)
+        w_NP_P = quaternion_to_matrix(satellite.q_BP).T @ state.w_NB_B
+    return eqx.tree_at(
+        lambda s: (s.q_NB, s.p_NP_N, s.q_NP, s.v_NP_N, s.w_NP_P),
+        state,
+        (q_NB, p_NP_N, q_NP, v_NP_N, w_NP_P),
+    )
+
+
+def _reason(piece: _Piece) -> str | None:
+    """Why a piece ended before its time, in words for the user."""
+    t = float(piece.time_reached)
+    if bool(piece.success) and bool(piece.finite):
+        return None
+    where = (
+        f"at t = {t:.6g} s, bus rate {_show(piece.final.w_NB_B)} rad/s, "
+        f"platform {_show(piece.final.p_NP_N - piece.final.p_NB_N)} m from the bus, "
+        f"gimbal rates {_show(piece.final.gimbal_rate)} rad/s"
+    )
+    if float(piece.margin) <= 0.0:
+        return (
+            f"a leg reached the end of its geometry (length near zero, or a universal joint in "
+            f"line with its leg) {where}. Likely: struts too soft for the load, or an unstable loop"
+        )
+    return (
+        f"the motion diverged: the step size fell below 1e-9 s or a value was not finite, {where}. "
+        "Likely: an unstable control loop (see `quietbus analyze`), a singular cluster with "
+        "steering by pseudo_inverse, or a strut that the tolerances cannot resolve"
+    )
+
+
+def _show(vector) -> str:
+    return "[" + ", ".join(f"{value:.4g}" for value in np.asarray(vector)) + "]"

@@ -1,0 +1,38 @@
+"""Products of 3-vectors, written out by component.
+
+A small ``dot`` or ``jnp.cross`` is a kernel of its own for XLA on a CPU; these forms merge with
+what surrounds them, and the equations of motion, all of them small, run about twice as fast.
+"""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+
+def dot(a: Float[Array, "*n 3"], b: Float[Array, "*n 3"]) -> Float[Array, "*n"]:
+    """Scalar product over the last axis."""
+    return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
+
+
+def cross(a: Float[Array, "*n 3"], b: Float[Array, "*n 3"]) -> Float[Array, "*n 3"]:
+    """Vector product over the last axis."""
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    return jnp.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+
+
+def rotate(R: Float[Array, "3 3"], v: Float[Array, "*n 3"]) -> Float[Array, "*n 3"]:
+    """``R v`` for one vector or for rows of vectors."""
+    return v[..., 0:1] * R[:, 0] + v[..., 1:2] * R[:, 1] + v[..., 2:3] * R[:, 2]
+
+
+def solve_positive_definite(M: Float[Array, "n n"], f: Float[Array, " n"]) -> Float[Array, " n"]:
+    """Solve ``M x = f`` for a small symmetric positive definite M by elimination.
+
+    Such a matrix needs no pivoting. A LAPACK call would do the same, but it is opaque to XLA and
+    keeps the integrator's loop from being compiled as one piece (see jaxconfig).
+    """
+    rows = jnp.concatenate([M, f[:, None]], axis=1)
+    for i in range(len(f)):
+        pivot = rows[i] / rows[i, i]
+        rows = (rows - rows[:, i : i + 1] * pivot).at[i].set(pivot)
+    return rows[:, -1]

@@ -1,0 +1,154 @@
+"""Satellites built straight from the model's parts, for tests of the physics."""
+
+from dataclasses import replace
+from typing import Literal
+
+import jax.numpy as jnp
+import numpy as np
+
+from quietbus.model.body import Bus, Plate
+from quietbus.model.cmg import ControlMomentGyro
+from quietbus.model.controller import GimbalServo, PIDController
+from quietbus.model.guidance import StepGuidance
+from quietbus.model.hexapod import Hexapod, LegParts
+from quietbus.model.satellite import Satellite
+from quietbus.model.steering import SingularityRobust
+from quietbus.spatial.rotation import (
+    quaternion_to_matrix,
+    rotation_vector_to_matrix,
+    rotation_vector_to_quaternion,
+)
+
+Mount = Literal["isolated", "rigid"]
+
+
+def paper_satellite(mount: Mount = "isolated", imbalance: float = 1.0) -> Satellite:
+    """The satellite of Zhang and Xu (2012), controlled; imbalance in units of the paper's."""
+    return Satellite(
+        bus=Bus(_array(1000.0), _array([[1100, -20, -10], [-20, 900, -15], [-10, -15, 800]])),
+        plate=Plate(_array(6.8), jnp.zeros(3), jnp.diag(_array([1.78, 1.78, 1.3]))),
+        legs=_legs(),
+        cluster=_cluster(imbalance),
+        p_BP_B=_array([0.0, 0.0, 0.6 + 0.25 * np.sqrt(2.0)]),
+        q_BP=_array([1.0, 0.0, 0.0, 0.0]),
+        servo=GimbalServo(_array(50.0), None, None),
+        guidance=StepGuidance(_array([1.0, 0.0, 0.0, 0.0])),
+        controller=PIDController(
+            kp=_array(200.0),
+            ki=_array(0.1),
+            kd=_array(2500.0),
+            J_feedforward_B=jnp.zeros((3, 3)),
+            unwinding=_array(1.0 / (0.1 * np.sqrt(2500.0 / 0.1))),
+            torque_limit=None,
+        ),
+        steering=SingularityRobust(_array(0.01), _array(10.0)),
+        loads=(),
+        mount=mount,
+    )
+
+
+def awkward_satellite(mount: Mount = "isolated", imbalance: float = 1.0) -> Satellite:
+    """Nothing aligned, centred or alike: every term of the equations of motion counts.
+
+    Tilted plate, mass centres off the axes, misaligned rotors, gimbal bodies with products of
+    inertia, heavy legs of unlike parts with much friction, slanted universal joints, preload.
+    """
+    rng = np.random.default_rng(2012)
+    satellite = paper_satellite(mount, imbalance)
+    legs, cluster = satellite.legs, satellite.cluster
+
+    def each(low: float, high: float) -> jnp.ndarray:
+        return _array(rng.uniform(low, high, 6))
+
+    q_BP = rotation_vector_to_quaternion(_array([0.1, -0.15, 0.4]))
+    p_BU_B = satellite.p_BP_B + legs.p_PU_P @ quaternion_to_matrix(q_BP).T
+    length = jnp.linalg.norm(p_BU_B - legs.p_BA_B, axis=1)
+    k_B = legs.k_B + _array(rng.normal(size=(6, 3), scale=0.3))
+    legs = replace(
+        legs,
+        k_B=k_B / jnp.linalg.norm(k_B, axis=1, keepdims=True),
+        stiffness=each(1e4, 3e4),
+        damping=each(200.0, 800.0),
+        free_length=0.98 * length,
+        nominal_length=length,
+        upper=LegParts(each(1, 2), each(0.1, 0.2), each(0.01, 0.02), each(0.001, 0.004)),
+        lower=LegParts(each(2, 4), each(0.1, 0.2), each(0.02, 0.04), each(0.001, 0.004)),
+        spherical_friction=each(0.5, 3.0),
+        universal_friction=each(0.5, 3.0),
+    )
+    products = np.array([[0.0, 0.01, 0.005], [0.01, 0.0, -0.007], [0.005, -0.007, 0.01]])
+    tilts = [rotation_vector_to_matrix(_array(rng.normal(size=3, scale=0.05))) for _ in range(4)]
+    cluster = replace(
+        cluster,
+        R_GF=jnp.stack(tilts),
+        I_GGcm_G=cluster.I_GGcm_G + products,
+        p_CGcm_G=_array(rng.normal(size=(4, 3), scale=0.02)),
+        p_CR_G=_array(rng.normal(size=(4, 3), scale=0.02)),
+        rotor_speed=cluster.rotor_speed * _array([1.0, -0.9, 1.1, 0.95]),
+    )
+    plate = Plate(satellite.plate.mass, _array([0.01, -0.02, 0.03]), satellite.plate.I_PPcm_P + 0.1)
+    return replace(satellite, legs=legs, cluster=cluster, plate=plate, q_BP=q_BP)
+
+
+def _legs() -> Hexapod:
+    root3 = np.sqrt(3.0)
+    upper = [[0.5, 0, 0], [-0.25, 0.25 * root3, 0], [-0.25, 0.25 * root3, 0]]
+    lower = [[0.25, 0.25 * root3, 0], [-0.5, 0, 0], [0.25, 0.25 * root3, 0]]
+    axes = [[-0.5 * root3, 0.5, 0], [0, -1, 0], [0.5 * root3, 0.5, 0]]
+    mirror = np.array([1.0, -1.0, 1.0])
+    p_PU_P = np.concatenate([upper, upper * mirror])
+    p_DA_D = np.concatenate([lower, lower * mirror])
+    # the fixed axes of the mirrored legs, as the paper lists them
+    k_B = np.concatenate([axes, np.array(axes) * [-1.0, 1.0, 1.0]])
+    length = np.full(
+        6, np.linalg.norm(p_PU_P[0] - p_DA_D[0] + np.array([0, 0, 0.25 * np.sqrt(2.0)]))
+    )
+    six = np.ones(6)
+    part = LegParts(*(_array(value * six) for value in (0.25, 0.15, 0.002, 1e-4)))
+    return Hexapod(
+        p_PU_P=_array(p_PU_P),
+        p_BA_B=_array(p_DA_D + np.array([0.0, 0.0, 0.6])),
+        k_B=_array(k_B),
+        stiffness=_array(2e4 * six),
+        damping=_array(500.0 * six),
+        free_length=_array(length),
+        nominal_length=_array(length),
+        upper=part,
+        lower=part,
+        spherical_friction=_array(1e-4 * six),
+        universal_friction=_array(1e-4 * six),
+    )
+
+
+def _cluster(imbalance: float) -> ControlMomentGyro:
+    azimuth, skew = 0.5 * np.pi * np.arange(4), np.deg2rad(53.13)
+    r = np.stack([np.cos(azimuth), np.sin(azimuth), 0.0 * azimuth], axis=1)
+    z = np.array([0.0, 0.0, 1.0])
+    g, s = np.sin(skew) * r + np.cos(skew) * z, np.cross(z, r)
+    speed = 200.0 * np.pi
+    along = 15.0 / speed
+    I_RRcm_R = np.diag([along, 0.6 * along, 0.6 * along])
+    I_RRcm_R[0, 1] = I_RRcm_R[1, 0] = -17e-7 * imbalance
+    four = np.ones(4)
+
+    def each(value: np.ndarray) -> jnp.ndarray:
+        return _array(np.repeat(value[None], 4, axis=0))
+
+    return ControlMomentGyro(
+        p_PC_P=_array(0.42 * r),
+        R_PG0=_array(np.stack([s, np.cross(g, s), g], axis=2)),
+        gimbal_mass=_array(13.0 * four),
+        p_CGcm_G=each(np.zeros(3)),
+        I_GGcm_G=each(0.06 * np.eye(3)),
+        rotor_mass=_array(6.0 * four),
+        p_CR_G=each(np.zeros(3)),
+        R_GF=each(np.eye(3)),
+        I_RRcm_R=each(I_RRcm_R),
+        eccentricity=_array(1.36e-5 / 6.0 * imbalance * four),
+        rotor_speed=_array(speed * four),
+        rotor_phase=_array([0.0, 0.7, 1.4, 2.1]),
+    )
+
+
+def _array(value: object) -> jnp.ndarray:
+    return jnp.asarray(value, dtype=float)

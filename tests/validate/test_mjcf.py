@@ -1,0 +1,65 @@
+"""The MuJoCo model that users can open."""
+
+import sys
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from oracles.satellites import awkward_satellite, paper_satellite
+from quietbus.validate.engine import import_mujoco
+from quietbus.validate.mjcf import write_mjcf
+from quietbus.validate.states import random_state
+
+mujoco = pytest.importorskip("mujoco")
+
+
+def _load(satellite, state, legs):
+    model = mujoco.MjModel.from_xml_string(write_mjcf(satellite, state, legs, timestep=2e-4))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("start").id)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
+@pytest.mark.parametrize("mount", ["isolated", "rigid"])
+@pytest.mark.parametrize(("legs", "leg_mass"), [("tendons", 0.0), ("bodies", 6 * 0.5)])
+def test_shapes_add_no_mass(legs, leg_mass, mount):
+    satellite = paper_satellite(mount)
+    model, _ = _load(satellite, random_state(satellite, np.random.default_rng(0)), legs)
+    assert model.ngeom > 0
+    assert sum(model.body_mass) == pytest.approx(1082.8 + leg_mass, rel=1e-9)
+    assert model.opt.timestep == 2e-4
+    assert not model.opt.gravity.any()
+
+
+@pytest.mark.parametrize("mount", ["isolated", "rigid"])
+def test_keyframe_is_the_state_with_every_leg_reaching_the_plate(mount):
+    satellite = awkward_satellite(mount)
+    state = random_state(satellite, np.random.default_rng(1))
+    _, data = _load(satellite, state, "bodies")
+    np.testing.assert_allclose(data.body("plate").xpos, state.p_NP_N, atol=1e-12)
+    np.testing.assert_allclose(data.joint("bus").qvel[3:], state.w_NB_B, atol=1e-12)
+    np.testing.assert_allclose(data.joint("rotor2").qpos, 1.4)
+    for i in range(6):
+        np.testing.assert_allclose(data.site(f"tip{i}").xpos, data.site(f"U{i}").xpos, atol=1e-12)
+
+
+def test_exported_legs_with_mass_hold_the_plate():
+    """The soft constraint of the file does for a look: tips stay at their joints within 0.1 mm."""
+    satellite = paper_satellite()
+    state = random_state(satellite, np.random.default_rng(2))
+    zero = jnp.zeros(3)
+    state = replace(state, v_NB_N=zero, w_NB_B=zero, v_NP_N=zero, w_NP_P=zero)
+    model, data = _load(satellite, state, "bodies")
+    mujoco.mj_step(model, data, 500)
+    for i in range(6):
+        gap = data.site(f"tip{i}").xpos - data.site(f"U{i}").xpos
+        assert np.linalg.norm(gap) < 1e-4
+
+
+def test_without_mujoco_the_message_tells_how_to_install_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with pytest.raises(ImportError, match=r"pip install 'quietbus\[validate\]'"):
+        import_mujoco()

@@ -1,0 +1,81 @@
+"""quietbus's flights against MuJoCo's own integrator: legs without mass, as spatial tendons."""
+
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from oracles.satellites import awkward_satellite, paper_satellite
+from quietbus.dynamics.closed_loop import initial_state
+from quietbus.dynamics.equations import Wrench
+from quietbus.validate.states import kicked_state, random_wrench
+from quietbus.validate.trajectory import (
+    differences,
+    fly,
+    fly_mujoco,
+    fly_mujoco_to,
+    held_gimbals,
+    largest_difference,
+    massless_legs,
+)
+
+pytest.importorskip("mujoco")
+
+TIMES = np.linspace(0.0, 1.0, 21)
+
+
+def _start(satellite):
+    """Turned bus at rest, gimbals at unlike angles."""
+    q_NB = jnp.array([0.9, 0.1, -0.3, 0.2])
+    return initial_state(
+        satellite, q_NB / jnp.linalg.norm(q_NB), jnp.zeros(3), jnp.array([0.1, -0.5, 1.0, 2.0])
+    )
+
+
+@pytest.mark.parametrize("mount", ["isolated", "rigid"])
+@pytest.mark.parametrize("imbalance", [1.0, 1000.0])
+@pytest.mark.parametrize("make", [paper_satellite, awkward_satellite])
+def test_flight_with_spinning_unbalanced_rotors_agrees_with_mujoco(make, imbalance, mount):
+    """Bus turning, plate kicked, gimbals turning, constant loads on both bodies; one second."""
+    satellite = massless_legs(make(mount, imbalance))
+    rng = np.random.default_rng(3)
+    state = kicked_state(satellite, _start(satellite), rng)
+    wrench = random_wrench(satellite, rng)
+    ours = fly(held_gimbals(satellite, wrench), state, jnp.asarray(TIMES))
+    theirs, own_error = fly_mujoco_to(1e-9, satellite, state, wrench, TIMES)
+    assert own_error <= 1e-9
+    assert largest_difference(theirs, ours) <= 1e-8
+
+
+def test_load_case_of_the_paper_agrees_with_mujoco():
+    """CMGs locked, 10 N along x and 30 N along z on the upper plate of the free satellite.
+
+    The paper compares this case with ADAMS.
+    """
+    satellite = massless_legs(paper_satellite())
+    cluster = replace(satellite.cluster, rotor_speed=jnp.zeros(4))
+    satellite = replace(satellite, cluster=cluster)
+    state = initial_state(satellite, jnp.array([1.0, 0, 0, 0]), jnp.zeros(3), jnp.zeros(4))
+    wrench = replace(Wrench.zero(), force_P=jnp.array([10.0, 0.0, 30.0]))
+    ours = fly(held_gimbals(satellite, wrench), state, jnp.asarray(TIMES))
+    theirs, own_error = fly_mujoco_to(1e-9, satellite, state, wrench, TIMES)
+    assert own_error <= 1e-9
+    assert largest_difference(theirs, ours) <= 1e-8
+    # it flies as the whole mass says: the load is what moves it
+    mass = 1000.0 + 6.8 + 4 * 19.0
+    momentum = 1000.0 * ours.v_NB_N[-1] + 82.8 * ours.v_NP_N[-1]
+    assert mass == pytest.approx(1082.8)
+    np.testing.assert_allclose(momentum, [10.0, 0.0, 30.0], atol=0.05)
+
+
+def test_mujoco_converges_to_our_flight_with_the_fourth_order():
+    """What remains between the two programs is MuJoCo's step error: 16 times less at half step."""
+    satellite = massless_legs(paper_satellite(imbalance=1000.0))
+    state, wrench = _start(satellite), Wrench.zero()
+    ours = fly(held_gimbals(satellite, wrench), state, jnp.asarray(TIMES))
+    coarse, fine = (
+        differences(ours, fly_mujoco(satellite, state, wrench, TIMES, step))["bus rate"]
+        for step in (4e-4, 2e-4)
+    )
+    assert coarse / fine == pytest.approx(16.0, rel=0.1)
