@@ -268,6 +268,19 @@ def test_phase_starts_at_the_integrators_and_is_continuous():
     )
 
 
+def test_phase_passes_unstable_resonances_without_a_jump():
+    """Conjugate poles and zeros in the right half-plane, at a gain where a jump would count."""
+    poles = np.poly([1 + 2j, 1 - 2j, -3, -4]).real
+    loop = Loop(tuple(200.0 * np.poly([0.5 + 3j, 0.5 - 3j]).real), tuple(poles))
+    omega = np.linspace(1e-3, 20.0, 20001)
+    phase = loop.phase(omega)
+    assert np.max(np.abs(np.diff(phase))) < 0.05
+    expected = np.polyval(loop.numerator, 1j * omega) / np.polyval(poles, 1j * omega)
+    np.testing.assert_allclose(loop.response(omega), expected, rtol=1e-9)
+    for gain in (0.01, 0.1, 1.0, 10.0):
+        assert unstable_at(loop, gain) == nyquist_counts(loop, gain).Z
+
+
 # --- delay, sampling, servo ----------------------------------------------------------------------
 
 
@@ -307,6 +320,21 @@ def test_margins_with_delay_satisfy_their_definition():
     gain = 10 ** (np.array(result.gain_margins_db) / 20)
     lag = np.exp(-0.05j * omega) / (1 + 1j * omega / 50.0)
     np.testing.assert_allclose(gain * paper_control()(1j * omega) * lag, -1.0, atol=1e-8)
+
+
+def test_tiny_delay_limits_a_rigid_mount_far_beyond_its_poles():
+    """kd/(I s) e^(-tau s) at high frequency: the limit is K = I pi/(2 tau)."""
+    ((low, high),) = stable_gain_range(paper_loop(RIGID, PID(200.0, 0.0, 2500.0), delay=1e-6))
+    assert low == 0.0
+    assert high == pytest.approx(INERTIA * np.pi / 2e-6, rel=1e-5)
+
+
+def test_long_delay_turns_are_all_found():
+    """Far above the poles only the delay turns the phase: one passage per 2 pi / tau."""
+    omega = analyze_loop(paper_loop(delay=20.0)).gain_margin_frequencies_hz
+    turns = np.diff(omega)[np.array(omega[:-1]) > 10.0] * 20.0
+    assert turns.size > 100
+    np.testing.assert_allclose(turns, 1.0, atol=0.05)
 
 
 def test_vanishing_delay_changes_nothing():
@@ -358,6 +386,12 @@ def test_verdicts(pid, words, stable):
     json.dumps(result.to_dict(), allow_nan=False)
 
 
+def test_rate_feedback_alone_has_no_stable_range():
+    """The attitude's pole at the origin is not in the loop, and no gain moves it."""
+    assert stable_gain_range(paper_loop(pid=PID(0.0, 0.0, 2500.0))) == ()
+    assert analyze_loop(paper_loop(pid=PID(0.0, 0.0, 2500.0))).stable_gain_range == ()
+
+
 def test_rigid_mount_has_no_upper_limit():
     """PID and 1/(I s^2): stable above K = I tp tq/(tp + tq), by Routh."""
     tp, tq = 0.079, 5e-4
@@ -399,6 +433,7 @@ def test_undamped_isolator_is_analysed():
     result = analyze_loop(loop)
     assert result.unstable_poles == unstable_at(loop, loop.gain) == 4
     assert result.consistent
+    assert len(result.gain_margins_db) == 1  # a passage at infinity, at a pole, has no margin
 
 
 @pytest.mark.parametrize(

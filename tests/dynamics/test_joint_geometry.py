@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from oracles.satellites import awkward_satellite
-from quietbus.dynamics.kinematics import leg_motion
+from quietbus.dynamics.kinematics import PlateMotion, leg_motion
 from quietbus.dynamics.state import State
 from quietbus.spatial.rotation import quaternion_to_matrix, rotation_vector_to_matrix
 from quietbus.validate.states import random_state
@@ -51,16 +51,9 @@ def test_leg_angular_velocity_is_that_of_the_joint_angles(seed):
     w = np.stack([cross[:, 2, 1], cross[:, 0, 2], cross[:, 1, 0]], axis=1)
 
     R_NB, R_NP, p_BP_N = _pose(state, 0.0)
-    motion = leg_motion(
-        legs,
-        R_NB,
-        R_NP,
-        p_BP_N,
-        state.v_NB_N,
-        R_NB @ state.w_NB_B,
-        state.v_NP_N,
-        R_NP @ state.w_NP_P,
-    )
+    w_B, w_P = R_NB @ state.w_NB_B, R_NP @ state.w_NP_P
+    plates = PlateMotion(R_NB, R_NP, p_BP_N, state.v_NB_N, w_B, state.v_NP_N, w_P)
+    motion = leg_motion(legs, plates)
     np.testing.assert_allclose(motion.w, w, atol=1e-8)
     np.testing.assert_allclose(motion.spin, np.sum(w * np.asarray(motion.s), axis=1), atol=1e-8)
 
@@ -73,7 +66,8 @@ def test_spin_derivatives_are_those_of_the_spin():
 
     def motion(v_P, w_B):
         w_P = jnp.array([0.3, -0.2, 0.5])
-        return leg_motion(satellite.legs, R_NB, R_NP, p_BP_N, state.v_NB_N, w_B, v_P, w_P)
+        plates = PlateMotion(R_NB, R_NP, p_BP_N, state.v_NB_N, w_B, v_P, w_P)
+        return leg_motion(satellite.legs, plates)
 
     at = (state.v_NP_N, R_NB @ state.w_NB_B)
     by_v, by_w = jax.jacfwd(lambda v, w: motion(v, w).spin, argnums=(0, 1))(*at)

@@ -1,16 +1,18 @@
 """The MuJoCo model that users can open."""
 
 import sys
-from dataclasses import replace
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from oracles.satellites import awkward_satellite, paper_satellite
+from quietbus.dynamics.closed_loop import initial_state
+from quietbus.dynamics.equations import Wrench
 from quietbus.validate.engine import import_mujoco
 from quietbus.validate.mjcf import write_mjcf
-from quietbus.validate.states import random_state
+from quietbus.validate.states import kicked_state, random_state
+from quietbus.validate.trajectory import fly, held_gimbals
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -46,17 +48,20 @@ def test_keyframe_is_the_state_with_every_leg_reaching_the_plate(mount):
         np.testing.assert_allclose(data.site(f"tip{i}").xpos, data.site(f"U{i}").xpos, atol=1e-12)
 
 
-def test_exported_legs_with_mass_hold_the_plate():
-    """The soft constraint of the file does for a look: tips stay at their joints within 0.1 mm."""
+def test_exported_legs_with_mass_fly_roughly_like_ours():
+    """The file's soft constraints do for a look: half a second without control."""
     satellite = paper_satellite()
-    state = random_state(satellite, np.random.default_rng(2))
-    zero = jnp.zeros(3)
-    state = replace(state, v_NB_N=zero, w_NB_B=zero, v_NP_N=zero, w_NP_P=zero)
+    state = initial_state(satellite, jnp.array([1.0, 0, 0, 0]), jnp.zeros(3), jnp.zeros(4))
+    state = kicked_state(satellite, state, np.random.default_rng(2))
+    times = jnp.array([0.0, 0.5])
+    ours = fly(held_gimbals(satellite, Wrench.zero()), state, times, 1e-9)
     model, data = _load(satellite, state, "bodies")
-    mujoco.mj_step(model, data, 500)
+    mujoco.mj_step(model, data, 2500)
     for i in range(6):
         gap = data.site(f"tip{i}").xpos - data.site(f"U{i}").xpos
-        assert np.linalg.norm(gap) < 1e-4
+        assert np.linalg.norm(gap) < 1e-6
+    between = data.body("plate").xpos - data.body("bus").xpos
+    np.testing.assert_allclose(between, ours.p_NP_N[-1] - ours.p_NB_N[-1], atol=5e-4)
 
 
 def test_without_mujoco_the_message_tells_how_to_install_it(monkeypatch):

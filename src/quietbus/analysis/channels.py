@@ -553,14 +553,15 @@ def _invariant_subspace(vectors: Sequence[Array], operators: Sequence[Array]) ->
     scaled = [A / norm for A in operators if (norm := np.linalg.norm(A, 2)) > 0]
     basis = np.empty((len(vectors[0]), 0))
     new = np.column_stack(vectors)
-    while True:
+    while basis.shape[1] < len(basis):
         new = new - basis @ (basis.T @ new)
         left, sizes, _ = np.linalg.svd(new, full_matrices=False)
         left = left[:, sizes > NEGLIGIBLE]
         if left.shape[1] == 0:
-            return basis
+            break
         basis = np.linalg.qr(np.hstack([basis, left]))[0]
         new = np.hstack([A @ basis for A in scaled])
+    return basis
 
 
 def json_ready(value: Any) -> Any:

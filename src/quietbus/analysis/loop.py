@@ -281,8 +281,7 @@ def _phase_samples(loop: Loop) -> Array:
     n_even, n_odd = even_odd(loop.numerator)
     d_even, d_odd = even_odd(loop.denominator)
     imaginary = P.polysub(P.polymul(n_odd, d_even), P.polymul(n_even, d_odd))
-    axis_poles = [abs(p) for p in loop.poles if p != 0 and p.real == 0]
-    return _between(np.append(np.sqrt(positive_roots(imaginary)), axis_poles))
+    return _between(np.sqrt(positive_roots(imaginary)))  # poles on the axis are roots of it too
 
 
 def _between(marks: Array) -> Array:
@@ -659,10 +658,9 @@ def root_locus(loop: Loop, gains: ArrayLike | None = None) -> RootLocus:
     scales = gains / loop.gain if loop.gain else np.zeros_like(gains)
     poles = np.array([np.roots(loop.closed_loop_polynomial(scale)) for scale in scales], complex)
     for i in range(1, len(poles)):
-        # follow each branch along its tangent, so that branches may cross
-        guess = 2.0 * poles[i - 1] - poles[i - 2] if i > 1 else poles[0]
-        size = np.abs(guess[:, None]) + np.abs(poles[i][None, :])
-        distance = np.abs(guess[:, None] - poles[i][None, :]) / np.where(size > 0, size, 1.0)
+        before, now = poles[i - 1][:, None], poles[i][None, :]
+        size = np.abs(before) + np.abs(now)
+        distance = np.abs(before - now) / np.where(size > 0, size, 1.0)
         poles[i] = poles[i][linear_sum_assignment(distance)[1]]
     return RootLocus(gains, poles)
 

@@ -36,15 +36,25 @@ def rotor_angles(satellite: Satellite, t: Float[Array, ""]) -> Float[Array, " cm
     return satellite.cluster.rotor_phase + satellite.cluster.rotor_speed * t
 
 
+def torque_axes(
+    satellite: Satellite, gimbal_angle: Float[Array, " cmg"]
+) -> tuple[Float[Array, "3 cmg"], Float[Array, ""]]:
+    """Momentum derivatives dh/dgamma over the units' RMS momentum, plate axes, and that momentum.
+
+    The RMS momentum [N m s] counts as 1 where no rotor turns.
+    """
+    cluster = satellite.cluster
+    h_rms = jnp.sqrt(jnp.mean(cluster.momentum**2))
+    h_rms = jnp.where(h_rms > 0.0, h_rms, 1.0)
+    t_P = eqx.filter_vmap(ControlMomentGyro.R_PG)(cluster, gimbal_angle)[:, :, 1]
+    return (cluster.momentum[:, None] * t_P).T / h_rms, h_rms
+
+
 def control_signals(satellite: Satellite, t: Float[Array, ""], state: State) -> ControlSignals:
     """Controller, steering and gimbal servo at time t [s]."""
     reference = satellite.guidance.reference(t)
     error = attitude_error(reference.q_NR, state.q_NB)
-    cluster = satellite.cluster
-    h_rms = jnp.sqrt(jnp.mean(cluster.momentum**2))
-    h_rms = jnp.where(h_rms > 0.0, h_rms, 1.0)
-    t_axes = eqx.filter_vmap(ControlMomentGyro.R_PG)(cluster, state.gimbal_angle)[:, :, 1]
-    A = (cluster.momentum[:, None] * t_axes).T / h_rms
+    A, h_rms = torque_axes(satellite, state.gimbal_angle)
 
     rate_command = jnp.zeros_like(state.gimbal_rate)
     torque = integral_rate = jnp.zeros(3)

@@ -143,6 +143,17 @@ class ClusterMoments(eqx.Module):
         mass = jnp.sum(cluster.gimbal_mass + cluster.rotor_mass)
         return cls(mass, cluster.rotor_speed, *eqx.filter_vmap(unit)(cluster))
 
+    def averaged(self) -> "ClusterMoments":
+        """The moments averaged over the rotor angles: the imbalance's rotating part is gone."""
+        constant = lambda coefficients: coefficients.at[:, :, 1:].set(0.0)  # noqa: E731
+        return ClusterMoments(
+            self.mass,
+            self.rotor_speed,
+            constant(self.c_H),
+            constant(self.J),
+            constant(self.H_gimbal),
+        )
+
     def at(
         self,
         gamma: Float[Array, " cmg"],

@@ -7,9 +7,9 @@ these hinges prescribes their motion while the motor's reaction still acts. The 
 - ``tendons``: massless struts between two points, exact for legs without mass and joint friction;
 - ``bodies``: trees on the bus, universal joint (hinge about the fixed axis k, hinge about the
   moving axis y = k x s), lower part, slide along s, upper part. What holds a leg's tip to the
-  plate is a ``connect`` constraint, which is soft in MuJoCo: good for looking at the motion.
-  ``quietbus.validate.reference`` closes the legs exactly instead. The friction of the spherical
-  joints has no counterpart in the file.
+  plate is a ``connect`` constraint, which is soft in MuJoCo: good for looking at the motion, with
+  errors of some 0.1 mm. ``quietbus.validate.reference`` closes the legs exactly instead. The
+  friction of the spherical joints has no counterpart in the file.
 
 Loads and control are not part of the file; gimbals and rotors keep their rates.
 """
@@ -86,7 +86,15 @@ def write_mjcf(
     else:
         equality = ET.SubElement(root, "equality")
         for i in range(len(satellite.legs.stiffness)):
-            ET.SubElement(equality, "connect", name=f"tip{i}", site1=f"tip{i}", site2=f"U{i}")
+            ET.SubElement(
+                equality,
+                "connect",
+                name=f"tip{i}",
+                site1=f"tip{i}",
+                site2=f"U{i}",
+                solref=_text([2.0 * timestep, 1.0]),  # as hard as MuJoCo allows
+                solimp="0.9999 0.9999 0.001",
+            )
     values = coordinates(satellite, state, phi)
     order = [e.get("name", "") for e in world.iter() if e.tag in ("joint", "freejoint")]
     ET.SubElement(

@@ -12,12 +12,14 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float
 from scipy.linalg import block_diag, eigh
 
 from quietbus.dynamics.closed_loop import rotor_angles, state_rate
 from quietbus.dynamics.equations import Wrench
 from quietbus.dynamics.state import State
+from quietbus.model.cmg import ClusterMoments
 from quietbus.model.load import Constant, Load
 from quietbus.model.satellite import Satellite
 from quietbus.spatial.inertia import point_inertia
@@ -53,21 +55,32 @@ def fly(
 ) -> State:
     """States at the given times [s] by quietbus's equations, with a leading axis of times.
 
-    The first time is that of ``state``. ``tolerance`` is relative, per step.
+    The first time is that of ``state``. ``tolerance`` is relative, per step. A flight that cannot
+    go on ends in numbers that are not finite.
     """
+    moments = ClusterMoments.expand(satellite.cluster)
+    start, unravel = ravel_pytree(state)
+
+    @jax.jit  # traced once for the integrator's many uses of it
+    def rate(t, y, _):
+        return ravel_pytree(state_rate(satellite, t, unravel(y), None, moments))[0]
+
     steps = diffrax.PIDController(rtol=tolerance, atol=0.1 * tolerance)
-    return diffrax.diffeqsolve(
-        diffrax.ODETerm(lambda t, y, _: state_rate(satellite, jnp.asarray(t), y)),
+    flight = diffrax.diffeqsolve(
+        diffrax.ODETerm(rate),
         diffrax.Dopri8(),
         times[0],
         times[-1],
         None,
-        state,
+        start,
         # interpolating between steps would cost more than the tolerance
         stepsize_controller=diffrax.ClipStepSizeController(steps, step_ts=times),
         saveat=diffrax.SaveAt(ts=times),
-        max_steps=1_000_000,
-    ).ys
+        adjoint=diffrax.ForwardMode(),
+        max_steps=200_000,
+        throw=False,
+    )
+    return jax.vmap(unravel)(flight.ys)
 
 
 def fly_mujoco_to(

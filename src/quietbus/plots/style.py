@@ -1,0 +1,119 @@
+"""How the pictures look: colours, line styles, axes, and lines that hide no peak."""
+
+import contextlib
+import itertools
+import pathlib
+import textwrap
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+# Okabe and Ito's colours, told apart by colour-blind readers too, without the pale yellow
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+DASHES = ("-", (0, (5, 1.5)), (0, (6, 1.5, 1, 1.5)), (0, (1.5, 1)))  # told apart in black and white
+WIDTH = 7.5  # [in] of a figure, two columns of a journal
+MARKERS = ("o", "s", "^")
+POINTS = 2400  # of a line, two for each dot of its width; more cannot be seen
+_RC: dict[Any, Any] = {
+    "font.size": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.titlelocation": "left",
+    "axes.xmargin": 0.01,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.formatter.useoffset": False,
+    "axes.formatter.limits": (-3, 4),
+    "axes.formatter.use_mathtext": True,
+    "grid.color": "0.88",
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.3,
+    "legend.frameon": False,
+    "legend.handlelength": 2.6,
+}
+
+
+@contextlib.contextmanager
+def style() -> Iterator[None]:
+    """The settings under which figures are made."""
+    with mpl.rc_context(_RC):
+        yield
+
+
+def new_figure(height: float, title: str) -> Figure:
+    """An empty figure of the usual width, ``height`` [in]."""
+    figure = Figure(figsize=(WIDTH, height), dpi=150)
+    figure.set_layout_engine("constrained", w_pad=0.08, h_pad=0.05)
+    figure.suptitle(title, fontsize=10.5, fontweight="bold", x=0.01, ha="left")
+    return figure
+
+
+def save_figures(
+    figures: dict[str, Figure], directory: str | pathlib.Path, suffix: str = ".png"
+) -> list[pathlib.Path]:
+    """Write figures as ``directory/name.suffix``: PNG at 150 dpi, or SVG or PDF."""
+    folder = pathlib.Path(directory)
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = [folder / f"{name}{suffix}" for name in figures]
+    for path, figure in zip(paths, figures.values(), strict=True):
+        figure.savefig(path)
+    return paths
+
+
+def thin(
+    time: np.ndarray, values: np.ndarray, points: int = POINTS
+) -> tuple[np.ndarray, np.ndarray]:
+    """At most ``points`` samples of a line that look the same: ends, minima and maxima.
+
+    A vibration much faster than the picture's resolution stays a band of its full height.
+
+    Args:
+        time: (n,).
+        values: (n,).
+    """
+    if len(time) <= points:
+        return time, values
+    edges = np.linspace(0, len(time), points // 2).astype(int)
+    kept = [0, len(time) - 1]
+    for start, end in itertools.pairwise(edges):
+        kept += [start + np.argmin(values[start:end]), start + np.argmax(values[start:end])]
+    index = np.unique(kept)
+    return time[index], values[index]
+
+
+def draw_lines(axes: Axes, time: np.ndarray, values: np.ndarray, labels: Sequence[str]) -> None:
+    """One line for each column of ``values`` (n, line), each with its colour and dashes."""
+    for i, label in enumerate(labels):
+        axes.plot(
+            *thin(time, values[:, i]),
+            color=COLOURS[i % len(COLOURS)],
+            linestyle=DASHES[i % len(DASHES)],
+            label=label,
+        )
+
+
+def share_legend(figure: Figure, axes: Axes) -> None:
+    """One legend below the figure for the lines of ``axes``."""
+    handles, labels = axes.get_legend_handles_labels()
+    if len(labels) > 1:
+        figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 8))
+
+
+def explain(axes: Axes, reason: str, columns: int = 70) -> None:
+    """Say in an empty picture why it is empty, in lines of at most so many letters."""
+    text = textwrap.fill(reason, columns)
+    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", color="0.3")
+    axes.set(xticks=[], yticks=[])
+
+
+def scaled(peak: float, unit: str) -> tuple[float, str]:
+    """Factor and unit for values up to ``peak``: 3e-4 deg/s is 300 of 10^-6 deg/s."""
+    if not (np.isfinite(peak) and peak > 0.0):
+        return 1.0, unit
+    exponent = 3 * int(np.floor(np.log10(peak) / 3.0 + 1e-9))
+    return (1.0, unit) if exponent == 0 else (10.0**-exponent, rf"$10^{{{exponent}}}$ {unit}")

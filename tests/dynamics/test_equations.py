@@ -1,0 +1,480 @@
+"""The equations of motion against closed forms, symmetries and Newton's and Euler's laws."""
+
+from dataclasses import replace
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.linalg import eigh
+
+from oracles.satellites import awkward_satellite, paper_satellite
+from quietbus.dynamics.closed_loop import evaluate, initial_state, rotor_angles, state_rate
+from quietbus.dynamics.equations import Wrench
+from quietbus.dynamics.invariants import body_motions, joint_motion, kinetic_energy
+from quietbus.dynamics.joint_forces import joint_forces
+from quietbus.model.load import Constant, Load
+from quietbus.spatial.inertia import point_inertia
+from quietbus.spatial.rotation import (
+    quaternion_multiply,
+    quaternion_to_matrix,
+    rotation_vector_to_quaternion,
+)
+from quietbus.validate.states import random_state, random_wrench
+from quietbus.validate.trajectory import fly, held_gimbals, massless_legs
+
+quickly = settings(deadline=None, max_examples=10)
+seeds = st.integers(0, 10_000)
+vectors = st.tuples(*[st.floats(-3.0, 3.0)] * 3).map(jnp.array)
+
+T0 = jnp.asarray(0.3)  # [s] time at which equations are compared: rotors in no special position
+IDENTITY = jnp.array([1.0, 0.0, 0.0, 0.0])
+MOUNTS = ["isolated", "rigid"]
+
+rate_of = eqx.filter_jit(state_rate)
+
+
+def at_rest(satellite):
+    """Plate in its nominal pose, everything at the origin and at rest."""
+    return initial_state(satellite, IDENTITY, jnp.zeros(3), jnp.zeros(4))
+
+
+def controlled(mount, seed):
+    """A satellite with every term in play, its control aiming anywhere, and a random state."""
+    rng = np.random.default_rng(seed)
+    satellite = awkward_satellite(mount, imbalance=100.0)
+    q_NR = rng.normal(size=4)
+    force, torque, point = rng.normal(size=(3, 3))
+    load = Load("plate", "body", *map(jnp.asarray, (5 * force, torque, point)), Constant())
+    satellite = replace(
+        satellite,
+        guidance=replace(satellite.guidance, q_NR=jnp.asarray(q_NR / np.linalg.norm(q_NR))),
+        loads=(load,),
+    )
+    return satellite, replace(random_state(satellite, rng), error_integral=rng.normal(size=3))
+
+
+def same_state(found, expected, atol):
+    for name, value in vars(expected).items():
+        np.testing.assert_allclose(getattr(found, name), value, atol=atol, err_msg=name)
+
+
+# --- closed forms ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("h_z", [-300.0, 0.0, 300.0])
+def test_free_axisymmetric_gyrostat_precesses_at_closed_form_rate(h_z):
+    """w_x + i w_y turns at ((I_a - I_t) w_z + h_z) / I_t, over ten seconds.
+
+    Balanced rotors spin along z, away from the axis; the bus is chosen so that the whole, platform
+    and legs included, is axisymmetric about its mass centre.
+    """
+    I_t, I_a, w0 = 1300.0, 1700.0, np.array([0.05, -0.03, 0.4])
+    satellite = held_gimbals(paper_satellite("rigid", imbalance=0.0), Wrench.zero())
+    R_PG0 = jnp.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])  # s, t, g = z, x, y
+    rotor = jnp.diag(jnp.array([0.5, 0.3, 0.3]))
+    cluster = replace(
+        satellite.cluster,
+        R_PG0=jnp.tile(R_PG0, (4, 1, 1)),
+        I_RRcm_R=jnp.tile(rotor, (4, 1, 1)),
+        rotor_speed=h_z / 0.5 * jnp.array([0.1, 0.2, 0.3, 0.4]),
+    )
+    satellite = replace(satellite, cluster=cluster)
+    bodies = body_motions(satellite, jnp.zeros(4), at_rest(satellite))
+    center = bodies.mass @ bodies.p_N / jnp.sum(bodies.mass)
+    others = sum(
+        I + point_inertia(m, p - center)
+        for m, I, p in zip(bodies.mass, bodies.I_N, bodies.p_N, strict=True)
+    ) - satellite.bus.I_BBcm_B
+    bus = replace(satellite.bus, I_BBcm_B=jnp.diag(jnp.array([I_t, I_t, I_a])) - others)
+    assert np.linalg.eigvalsh(bus.I_BBcm_B).min() > 100.0
+    satellite = replace(satellite, bus=bus)
+
+    times = jnp.linspace(0.0, 10.0, 6)
+    start = initial_state(satellite, IDENTITY, jnp.asarray(w0), jnp.zeros(4))
+    w = fly(satellite, start, times).w_NB_B
+    turning = ((I_a - I_t) * w0[2] + h_z) / I_t
+    expected = (w0[0] + 1j * w0[1]) * np.exp(1j * turning * times)
+    np.testing.assert_allclose(w[:, 0] + 1j * w[:, 1], expected, atol=1e-10)
+    np.testing.assert_allclose(w[:, 2], w0[2], rtol=1e-10)
+
+
+@pytest.mark.parametrize(("damping_ratio", "peak"), [(0.1, 5.1228), (0.5, 1.4679), (1.0, 1.1547)])
+def test_strut_transmits_force_as_the_single_axis_isolator(damping_ratio, peak):
+    """Force on a heavy bus per force on the plate along z: (c s + k) / (M s^2 + c s + k).
+
+    Eq. 1 of the paper with M = 82.8 kg and six struts at 1/sqrt(3) from z; the peaks are those of
+    its figure 1. All curves pass through 1 at sqrt(2) times the natural frequency.
+    """
+    M, k = 82.8, 6 * 2e4 / 3
+    c = 2.0 * damping_ratio * np.sqrt(k * M)
+    satellite = _stopped(massless_legs(paper_satellite(imbalance=0.0)))
+    bus = replace(satellite.bus, mass=jnp.asarray(1e10), I_BBcm_B=1e10 * jnp.eye(3))
+    legs = replace(satellite.legs, damping=jnp.full(6, c / 2.0))
+    satellite = replace(satellite, bus=bus, legs=legs)
+    state = at_rest(satellite)
+
+    def accelerations(shift, velocity, force):
+        """Of plate and bus along z, the bus's times its mass."""
+        wrench = replace(Wrench.zero(), force_P=force * jnp.array([0.0, 0.0, 1.0]))
+        moved = replace(
+            state,
+            p_NP_N=state.p_NP_N.at[2].add(shift),
+            v_NP_N=state.v_NP_N.at[2].add(velocity),
+        )
+        rate = state_rate(held_gimbals(satellite, wrench), jnp.zeros(()), moved)
+        return jnp.stack([rate.v_NP_N[2], bus.mass * rate.v_NB_N[2]])
+
+    jacobian = jax.jit(jax.jacfwd(accelerations, argnums=(0, 1, 2)))
+    by_shift, by_velocity, by_force = (np.asarray(j) for j in jacobian(0.0, 0.0, 0.0))
+    natural = np.sqrt(k / M)
+    s = 1j * natural * np.geomspace(0.01, 100.0, 2001)
+    shift = by_force[0] / (s**2 - by_velocity[0] * s - by_shift[0])
+    G = (by_shift[1] + by_velocity[1] * s) * shift + by_force[1]
+    np.testing.assert_allclose(G, (c * s + k) / (M * s**2 + c * s + k), rtol=1e-6)
+    assert np.abs(G).max() == pytest.approx(peak, abs=6e-5)
+    assert np.interp(np.sqrt(2.0), np.abs(s) / natural, np.abs(G)) == pytest.approx(1.0, abs=1e-4)
+
+
+def test_six_rigid_body_and_six_elastic_modes():
+    """Small motions about rest: stiffness from the legs' directions, mass from kinetic energy."""
+    satellite = _stopped(held_gimbals(paper_satellite(), Wrench.zero()))
+    state = at_rest(satellite)
+    phi = satellite.cluster.rotor_phase
+
+    def moved(x, u):
+        """Displacements and turns x, velocities and rates u, of plate and bus."""
+        return replace(
+            state,
+            p_NP_N=state.p_NP_N + x[:3],
+            q_NP=rotation_vector_to_quaternion(x[3:6]),
+            p_NB_N=x[6:9],
+            q_NB=rotation_vector_to_quaternion(x[9:]),
+            v_NP_N=u[:3],
+            w_NP_P=u[3:6],
+            v_NB_N=u[6:9],
+            w_NB_B=u[9:],
+        )
+
+    def accelerations(x, u):
+        rate = state_rate(satellite, jnp.zeros(()), moved(x, u))
+        return jnp.concatenate([rate.v_NP_N, rate.w_NP_P, rate.v_NB_N, rate.w_NB_B])
+
+    zero = jnp.zeros(12)
+    by_x, by_u = jax.jit(jax.jacfwd(accelerations, argnums=(0, 1)))(zero, zero)
+
+    legs = jax.tree.map(np.asarray, satellite.legs)
+    p_U, p_A = legs.p_PU_P + np.asarray(satellite.p_BP_B), legs.p_BA_B
+    s = (p_U - p_A) / np.linalg.norm(p_U - p_A, axis=1, keepdims=True)
+    stretch = np.hstack([s, np.cross(legs.p_PU_P, s), -s, -np.cross(p_A, s)])
+    K = stretch.T @ (legs.stiffness[:, None] * stretch)
+    M = jax.jit(jax.hessian(lambda u: kinetic_energy(satellite, phi, moved(zero, u))))(zero)
+    expected = eigh(K, np.asarray(M), eigvals_only=True)
+
+    squares = np.sort(np.linalg.eigvals(-np.asarray(by_x)).real)
+    np.testing.assert_allclose(squares[6:], expected[6:], rtol=1e-9)
+    assert squares[6] > 100.0
+    assert np.abs(squares[:6]).max() < 1e-9 * squares[6]  # six motions without stiffness
+
+    damped = np.linalg.eigvals(np.block([[np.zeros((12, 12)), np.eye(12)], [by_x, by_u]]))
+    elastic = damped[np.abs(damped) > 1.0]
+    assert len(elastic) == 12
+    assert elastic.real.max() < -0.01
+    # rigid-body poles lie at zero, twelve in six chains of two: computed to the square root
+    assert np.sort(np.abs(damped))[11] < 1e-4
+
+
+@pytest.mark.parametrize("unit", range(4))
+@pytest.mark.parametrize("phi", [0.0, 1.0, 4.0])
+def test_rotor_imbalance_shakes_a_heavy_bus_by_its_closed_forms(unit, phi):
+    """m e Omega^2 outwards along the imbalance, and I_xy Omega^2 across it, on a rigid mount."""
+    satellite = held_gimbals(paper_satellite("rigid"), Wrench.zero())
+    heavy = replace(satellite.bus, mass=jnp.asarray(1e11), I_BBcm_B=1e11 * jnp.eye(3))
+    speed = 200.0 * np.pi * (jnp.arange(4) == unit)
+    satellite = replace(
+        satellite, bus=heavy, cluster=replace(satellite.cluster, rotor_speed=speed)
+    )
+    _, found = eqx.filter_jit(evaluate)(
+        satellite, jnp.zeros(()), at_rest(satellite), jnp.full(4, phi)
+    )
+    s, t, g = np.asarray(satellite.cluster.R_PG0[unit]).T
+    outwards, across = np.cos(phi) * t + np.sin(phi) * g, np.cos(phi) * g - np.sin(phi) * t
+    np.testing.assert_allclose(np.cross(s, outwards), across, atol=1e-12)
+    force = 1.36e-5 * (200.0 * np.pi) ** 2 * outwards  # g cm in kg m
+    arm = np.asarray(satellite.p_BP_B + satellite.cluster.p_PC_P[unit])
+    torque = 17e-7 * (200.0 * np.pi) ** 2 * across  # g cm^2 in kg m^2
+    np.testing.assert_allclose(1e11 * found.v_B, force, atol=1e-6)
+    np.testing.assert_allclose(1e11 * found.w_B, torque + np.cross(arm, force), atol=1e-6)
+
+
+def _stopped(satellite):
+    cluster = replace(satellite.cluster, rotor_speed=jnp.zeros(4))
+    return replace(satellite, cluster=cluster)
+
+
+# --- symmetries --------------------------------------------------------------------------------
+
+
+def in_rotated_space(satellite, state, q, shift, velocity):
+    """Satellite, target and motion turned by q, moved and set moving in inertial space."""
+    R = quaternion_to_matrix(q)
+    guidance = replace(satellite.guidance, q_NR=quaternion_multiply(q, satellite.guidance.q_NR))
+    turned = replace(
+        state,
+        p_NB_N=R @ state.p_NB_N + shift,
+        p_NP_N=R @ state.p_NP_N + shift,
+        v_NB_N=R @ state.v_NB_N + velocity,
+        v_NP_N=R @ state.v_NP_N + velocity,
+        q_NB=quaternion_multiply(q, state.q_NB),
+        q_NP=quaternion_multiply(q, state.q_NP),
+    )
+    return replace(satellite, guidance=guidance), turned
+
+
+def rate_in_rotated_space(rate, q, velocity):
+    zero = jnp.zeros(3)
+    _, turned = in_rotated_space(controlled("rigid", 0)[0], rate, q, velocity, zero)
+    return turned
+
+
+@pytest.mark.parametrize("mount", MOUNTS)
+@quickly
+@given(seed=seeds, turn=vectors, shift=vectors, velocity=vectors)
+def test_space_has_no_preferred_direction_place_or_velocity(mount, seed, turn, shift, velocity):
+    satellite, state = controlled(mount, seed)
+    q = rotation_vector_to_quaternion(turn)
+    found = rate_of(*_at(T0, *in_rotated_space(satellite, state, q, shift, velocity)))
+    expected = rate_in_rotated_space(rate_of(satellite, T0, state), q, velocity)
+    same_state(found, expected, atol=1e-8)
+
+
+def _at(t, satellite, state):
+    return satellite, t, state
+
+
+def mirrored(satellite, state):
+    """Satellite and motion seen in a mirror in the xz plane.
+
+    A position or force v is seen as S v with S = diag(1, -1, 1), an angular velocity or torque as
+    -S w, a body's attitude R and its inertia I as S R S and S I S. A CMG's spin and gimbal axes
+    stand for angular velocities, so they are seen as -S s and -S g, and t = g x s as -S t: its
+    angles and speeds stay as they are, and what it holds changes sides in its own frame.
+    """
+    S = jnp.array([1.0, -1.0, 1.0])
+    both, turned = S[:, None] * S, jnp.array([1.0, -1.0, 1.0, -1.0])  # of matrices, quaternions
+    bus = replace(satellite.bus, I_BBcm_B=both * satellite.bus.I_BBcm_B)
+    plate = replace(
+        satellite.plate,
+        p_PPcm_P=S * satellite.plate.p_PPcm_P,
+        I_PPcm_P=both * satellite.plate.I_PPcm_P,
+    )
+    legs = satellite.legs
+    legs = replace(legs, p_PU_P=S * legs.p_PU_P, p_BA_B=S * legs.p_BA_B, k_B=S * legs.k_B)
+    cluster = satellite.cluster
+    cluster = replace(
+        cluster,
+        p_PC_P=S * cluster.p_PC_P,
+        R_PG0=-S[:, None] * cluster.R_PG0,
+        p_CGcm_G=-cluster.p_CGcm_G,
+        p_CR_G=-cluster.p_CR_G,
+        eccentricity=-cluster.eccentricity,
+    )
+    loads = tuple(
+        replace(load, force=S * load.force, torque=-S * load.torque, point=S * load.point)
+        for load in satellite.loads
+    )
+    seen = replace(
+        satellite,
+        bus=bus,
+        plate=plate,
+        legs=legs,
+        cluster=cluster,
+        p_BP_B=S * satellite.p_BP_B,
+        q_BP=turned * satellite.q_BP,
+        guidance=replace(satellite.guidance, q_NR=turned * satellite.guidance.q_NR),
+        loads=loads,
+    )
+    return seen, mirrored_state(state)
+
+
+def mirrored_state(state):
+    """Also of a state's rate."""
+    S, turned = jnp.array([1.0, -1.0, 1.0]), jnp.array([1.0, -1.0, 1.0, -1.0])
+    return replace(
+        state,
+        p_NB_N=S * state.p_NB_N,
+        p_NP_N=S * state.p_NP_N,
+        v_NB_N=S * state.v_NB_N,
+        v_NP_N=S * state.v_NP_N,
+        q_NB=turned * state.q_NB,
+        q_NP=turned * state.q_NP,
+        w_NB_B=-S * state.w_NB_B,
+        w_NP_P=-S * state.w_NP_P,
+        error_integral=-S * state.error_integral,
+    )
+
+
+@pytest.mark.parametrize("mount", MOUNTS)
+@quickly
+@given(seed=seeds)
+def test_mirrored_satellite_has_mirrored_accelerations(mount, seed):
+    satellite, state = controlled(mount, seed)
+    found = rate_of(*_at(T0, *mirrored(satellite, state)))
+    same_state(found, mirrored_state(rate_of(satellite, T0, state)), atol=1e-8)
+
+
+@pytest.mark.parametrize("mount", MOUNTS)
+@quickly
+@given(seed=seeds, leg_order=st.permutations(range(6)), cmg_order=st.permutations(range(4)))
+def test_labels_of_legs_and_cmgs_mean_nothing(mount, seed, leg_order, cmg_order):
+    satellite, state = controlled(mount, seed)
+    legs, cmgs = np.array(leg_order), np.array(cmg_order)
+
+    def relabelled(state):
+        gimbals = (state.gimbal_angle[cmgs], state.gimbal_rate[cmgs])
+        return replace(state, gimbal_angle=gimbals[0], gimbal_rate=gimbals[1])
+
+    other = replace(
+        satellite,
+        legs=jax.tree.map(lambda value: value[legs], satellite.legs),
+        cluster=jax.tree.map(lambda value: value[cmgs], satellite.cluster),
+    )
+    found = rate_of(other, T0, relabelled(state))
+    same_state(found, relabelled(rate_of(satellite, T0, state)), atol=1e-8)
+
+
+def test_motion_is_the_same_in_rotated_space_and_mirrored_in_a_mirror():
+    """Fifty milliseconds, five turns of the rotors, with strong imbalance."""
+    satellite, state = controlled("isolated", 1)
+    times = jnp.array([0.0, 0.05])
+    end = jax.tree.map(lambda value: value[-1], fly(satellite, state, times, 1e-11))
+    assert np.abs(end.v_NP_N - state.v_NP_N).max() > 0.1
+
+    q, shift = rotation_vector_to_quaternion(jnp.array([0.5, 1.5, -1.0])), jnp.ones(3)
+    other, start = in_rotated_space(satellite, state, q, shift, jnp.zeros(3))
+    found = jax.tree.map(lambda value: value[-1], fly(other, start, times, 1e-11))
+    same_state(found, in_rotated_space(satellite, end, q, shift, jnp.zeros(3))[1], atol=1e-8)
+
+    found = jax.tree.map(lambda value: value[-1], fly(*mirrored(satellite, state), times, 1e-11))
+    same_state(found, mirrored_state(end), atol=1e-8)
+
+
+# --- joints ------------------------------------------------------------------------------------
+
+
+@eqx.filter_jit
+def balances(satellite, state):
+    """Momentum rates of all bodies, their angular momentum about the origin, and joint forces."""
+    rate = state_rate(satellite, T0, state)
+
+    def momenta(t, state):
+        bodies = body_motions(satellite, rotor_angles(satellite, t), state)
+        linear = bodies.mass[:, None] * bodies.v_N
+        angular = jnp.cross(bodies.p_N, linear) + jnp.einsum("bij,bj->bi", bodies.I_N, bodies.w_N)
+        return linear, angular
+
+    _, rates = jax.jvp(momenta, (T0, state), (jnp.ones(()), rate))
+    _, acceleration = evaluate(satellite, T0, state)
+    return *rates, joint_forces(satellite, state, acceleration), joint_motion(satellite, state)
+
+
+def joint_case(seed):
+    rng = np.random.default_rng(seed)
+    satellite = awkward_satellite(imbalance=100.0)
+    wrench = random_wrench(satellite, rng)
+    state = random_state(satellite, rng)
+    loads = held_gimbals(satellite, wrench).loads
+    satellite = replace(satellite, loads=loads)
+    R_NB, R_NP = quaternion_to_matrix(state.q_NB), quaternion_to_matrix(state.q_NP)
+    p_U = np.asarray(state.p_NP_N + satellite.legs.p_PU_P @ R_NP.T)
+    p_A = np.asarray(state.p_NB_N + satellite.legs.p_BA_B @ R_NB.T)
+    linear, angular, forces, joints = balances(satellite, state)
+    friction_U = -satellite.legs.spherical_friction[:, None] * joints.w_leg_in_plate_N
+    friction_A = -satellite.legs.universal_friction[:, None] * joints.w_leg_in_bus_N
+    at_U = forces.spherical_force, np.cross(p_U, forces.spherical_force) + friction_U
+    moment = forces.universal_moment[:, None] * forces.h
+    at_A = forces.universal_force, np.cross(p_A, forces.universal_force) + friction_A + moment
+    return satellite, state, wrench, (np.asarray(linear), np.asarray(angular)), at_U, at_A, forces
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_joint_forces_are_what_moves_each_leg(seed):
+    """Newton and Euler for each leg alone: F_s + F_u, their moments, M_u and friction."""
+    _, _, _, rates, at_U, at_A, _ = joint_case(seed)
+    for rate, upper, lower in zip(rates, at_U, at_A, strict=True):
+        of_leg = rate[10:16] + rate[16:22]  # lower and upper part
+        assert np.abs(of_leg).max() > 1.0
+        np.testing.assert_allclose(upper + lower, of_leg, atol=1e-8)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_joint_forces_and_loads_are_what_moves_plate_and_bus(seed):
+    """Newton and Euler for the plate with all its CMGs, and for the bus, spinning and tumbling."""
+    _, state, wrench, (linear, angular), at_U, at_A, _ = joint_case(seed)
+    p_P, p_B = state.p_NP_N, state.p_NB_N
+    plate = slice(1, 10)  # plate, four gimbal bodies, four rotors
+    tolerance = {"rtol": 1e-9, "atol": 1e-7}
+    np.testing.assert_allclose(
+        linear[plate].sum(0), wrench.force_P - at_U[0].sum(0), **tolerance
+    )
+    torque = wrench.torque_P + np.cross(p_P, wrench.force_P)
+    np.testing.assert_allclose(angular[plate].sum(0), torque - at_U[1].sum(0), **tolerance)
+    np.testing.assert_allclose(linear[0], wrench.force_B - at_A[0].sum(0), **tolerance)
+    torque = wrench.torque_B + np.cross(p_B, wrench.force_B)
+    np.testing.assert_allclose(angular[0], torque - at_A[1].sum(0), **tolerance)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_struts_alone_push_the_upper_parts_along_the_legs(seed):
+    """Along s: m_u a_u = F_s - (k stretch + c stretch rate) s. h is normal to both joint axes."""
+    satellite, state, _, (linear, _), at_U, _, forces = joint_case(seed)
+    legs, joints = satellite.legs, joint_motion(satellite, state)
+    s = _directions(satellite, state)
+    tension = legs.stiffness * (joints.length - legs.free_length) + legs.damping * joints.length_rate
+    along = np.sum(s * (at_U[0] - linear[16:22]), axis=1)
+    np.testing.assert_allclose(along, tension, atol=1e-8)
+    k = np.asarray(legs.k_B @ quaternion_to_matrix(state.q_NB).T)
+    np.testing.assert_allclose(np.sum(forces.h * k, axis=1), np.zeros(6), atol=1e-12)
+    np.testing.assert_allclose(np.sum(forces.h * np.cross(k, s), axis=1), np.zeros(6), atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(forces.h, axis=1), np.ones(6), rtol=1e-12)
+
+
+def test_massless_legs_carry_their_strut_force_and_nothing_else():
+    satellite = massless_legs(awkward_satellite(imbalance=100.0))
+    state = random_state(satellite, np.random.default_rng(4))
+    _, _, forces, joints = balances(satellite, state)
+    legs = satellite.legs
+    tension = legs.stiffness * (joints.length - legs.free_length) + legs.damping * joints.length_rate
+    expected = tension[:, None] * _directions(satellite, state)
+    np.testing.assert_allclose(forces.spherical_force, expected, atol=1e-9)
+    np.testing.assert_allclose(forces.universal_force, -expected, atol=1e-9)
+    np.testing.assert_allclose(forces.universal_moment, np.zeros(6), atol=1e-9)
+
+
+def _directions(satellite, state):
+    R_NB, R_NP = quaternion_to_matrix(state.q_NB), quaternion_to_matrix(state.q_NP)
+    legs = satellite.legs
+    p_U, p_A = state.p_NP_N + legs.p_PU_P @ R_NP.T, state.p_NB_N + legs.p_BA_B @ R_NB.T
+    return np.asarray((p_U - p_A) / jnp.linalg.norm(p_U - p_A, axis=1, keepdims=True))
+
+
+# --- rigid mount -------------------------------------------------------------------------------
+
+
+def test_rigid_mount_holds_the_plate_where_the_bus_has_it():
+    """Under control, loads and strong imbalance, for half a second."""
+    satellite, state = controlled("rigid", 2)
+    states = fly(satellite, state, jnp.array([0.0, 0.25, 0.5]), 1e-11)
+    assert np.abs(states.w_NB_B - state.w_NB_B).max() > 1e-3
+    for i in range(3):
+        now = jax.tree.map(lambda value, i=i: value[i], states)
+        held = initial_state(satellite, now.q_NB, now.w_NB_B, now.gimbal_angle)
+        pose = (now.p_NP_N - now.p_NB_N, now.v_NP_N - now.v_NB_N, now.w_NP_P)
+        for found, expected in zip(pose, (held.p_NP_N, held.v_NP_N, held.w_NP_P), strict=True):
+            np.testing.assert_allclose(found, expected, atol=1e-9)
+        np.testing.assert_allclose(
+            quaternion_to_matrix(now.q_NP), quaternion_to_matrix(held.q_NP), atol=1e-9
+        )

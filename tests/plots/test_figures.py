@@ -1,0 +1,188 @@
+"""Pictures of synthetic runs: complete, labelled, and honest about what cannot be shown."""
+
+import re
+
+import matplotlib.image
+import numpy as np
+import pytest
+import xarray as xr
+
+from quietbus.plots import compare_figures, run_figures, save_figures
+from quietbus.plots.signals import euler_angles, jitter, rate_spectrum
+from quietbus.plots.style import scaled, thin
+from quietbus.results import VARIABLES
+from quietbus.scenario import load_scenario
+
+SLOW, ROTOR = 1e-3, 100.0  # [rad/s], [Hz]
+AMPLITUDE = {"rigid": np.array([9e-6, 8e-6, 3e-6]), "isolated": np.array([1e-7, 2e-7, 1.5e-7])}
+RUN_FIGURES = {"attitude", "rates", "gimbals", "spectrum", "control", "struts"}
+
+
+def synthetic(mount="isolated", count=4000, rate=1000.0, cmgs=4, legs=6, status="complete"):
+    """A run whose bus turns slowly about roll and vibrates at the rotors' frequency."""
+    scenario = load_scenario("zhang2012").with_overrides(
+        {"isolator.mount": mount, "simulation.output_rate": rate}
+    )
+    time = np.arange(count) / rate
+    sizes = {"axis": 3, "quaternion": 4, "cmg": cmgs, "leg": legs}
+    wave = np.sin(2 * np.pi * ROTOR * time + 0.3)
+    data = {}
+    for name, (dimensions, unit, _) in VARIABLES.items():
+        shape = (count, *(sizes[dimension] for dimension in dimensions))
+        values = 1e-3 * np.sin(np.arange(np.prod(shape)).reshape(shape))
+        data[name] = (("time", *dimensions), values, {"units": unit})
+    half = 0.5 * SLOW * time
+    quaternion = np.column_stack([np.cos(half), np.sin(half), 0 * half, 0 * half])
+    data["bus_attitude"] = (("time", "quaternion"), quaternion)
+    error = np.column_stack([2 * np.sin(half), 0 * half, 0 * half])
+    data["attitude_error"] = (("time", "axis"), error)
+    data["bus_rate"] = (("time", "axis"), [SLOW, 0, 0] + wave[:, None] * AMPLITUDE[mount])
+    attributes = {
+        "title": f"zhang2012, {mount}",
+        "mount": mount,
+        "status": status,
+        "scenario": scenario.to_yaml(),
+    }
+    return xr.Dataset(data, {"time": time}, attributes)
+
+
+def pair(**options):
+    return {mount: synthetic(mount, **options) for mount in ("isolated", "rigid")}
+
+
+def texts(figure):
+    return [text.get_text() for axes in figure.axes for text in axes.texts]
+
+
+def test_a_run_has_all_pictures_and_a_rigid_one_no_struts():
+    assert run_figures(synthetic()).keys() == RUN_FIGURES
+    assert run_figures(synthetic("rigid")).keys() == RUN_FIGURES - {"struts"}
+
+
+def test_every_labelled_axis_has_a_unit():
+    figures = [*run_figures(synthetic()).values(), *compare_figures(pair()).values()]
+    for figure in figures:
+        labels = [label for a in figure.axes for label in (a.get_xlabel(), a.get_ylabel()) if label]
+        assert labels
+        assert all(re.search(r"\[.+\]$", label) for label in labels), labels
+
+
+@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
+def test_pictures_are_saved(tmp_path, suffix):
+    figures = run_figures(synthetic())
+    paths = save_figures(figures, tmp_path / "new" / "folder", suffix)
+    assert [path.name for path in paths] == [f"{name}{suffix}" for name in figures]
+    for path in paths:
+        assert 1000 < path.stat().st_size < 1_000_000
+        if suffix == ".png":
+            assert np.ptp(matplotlib.image.imread(path)) > 0.5
+
+
+@pytest.mark.parametrize("count", [2, 3, 10])
+def test_a_run_of_few_samples_has_pictures_that_say_what_is_missing(tmp_path, count):
+    runs = pair(count=count, status="interrupted")
+    figures = run_figures(runs["isolated"])
+    save_figures(figures, tmp_path)
+    assert any("no spectrum" in text for text in texts(figures["spectrum"]))
+    assert "interrupted" in figures["attitude"].get_suptitle()
+    both = compare_figures(runs)
+    save_figures(both, tmp_path / "both")
+    if count < 8:
+        assert any("no residual" in text for text in texts(both["residual"]))
+
+
+def test_runs_of_different_length_are_compared(tmp_path):
+    runs = {"isolated": synthetic(count=5, status="stopped"), "rigid": synthetic("rigid")}
+    figures = compare_figures(runs)
+    save_figures(figures, tmp_path)
+    assert "isolated, stopped" in figures["attitude"].get_suptitle()
+    assert "no spectrum" in figures["spectrum"].axes[0].get_title(loc="left")
+
+
+def test_too_low_an_output_rate_is_told_instead_of_showing_aliased_jitter(tmp_path):
+    runs = pair(rate=200.0)
+    figures = run_figures(runs["isolated"])
+    assert any("cannot show" in text.replace("\n", " ") for text in texts(figures["rates"]))
+    assert "aliased" in figures["spectrum"].axes[0].get_title(loc="left")
+    save_figures(compare_figures(runs), tmp_path)
+
+
+@pytest.mark.parametrize(("cmgs", "legs"), [(1, 8), (16, 30)])
+def test_any_number_of_cmgs_and_legs(cmgs, legs):
+    figures = run_figures(synthetic(cmgs=cmgs, legs=legs))
+    for name, count in (("gimbals", cmgs), ("struts", legs)):
+        looks = {
+            (str(line._dash_pattern), line.get_color()) for line in figures[name].axes[0].lines
+        }
+        assert len(looks) == min(count, 28)
+
+
+def test_a_comparison_needs_both_mounts():
+    with pytest.raises(ValueError, match="rigid and isolated"):
+        compare_figures({"rigid": synthetic("rigid")})
+
+
+def test_jitter_and_spectrum_show_the_amplitude_that_was_put_in():
+    for mount, run in pair().items():
+        amplitude = np.rad2deg(AMPLITUDE[mount])
+        last = jitter(run)
+        assert last.time[-1] == pytest.approx(1e3 * 10 / ROTOR)
+        # the cubic that is taken off follows the ends of a hundred waves by up to 8 / (100 pi)
+        assert np.max(abs(last.rate), axis=0) == pytest.approx(amplitude, rel=0.03)
+        lines, span = rate_spectrum(run)
+        assert np.max(lines.amplitude, axis=0) == pytest.approx(amplitude, rel=2e-3)
+        assert span == pytest.approx(2.0, abs=0.01)
+
+
+def test_the_picture_for_newcomers_tells_the_reduction():
+    story = compare_figures(pair())["rates"].get_suptitle()
+    assert "20 to 90 times less" in story
+
+
+def test_attitude_is_roll_pitch_yaw_and_the_target_stands_still():
+    run = synthetic(count=4001)
+    bus, target = euler_angles(run)
+    assert bus[-1] == pytest.approx([np.rad2deg(4.0 * SLOW), 0.0, 0.0], abs=1e-9)
+    assert np.max(abs(target)) < 1e-9
+
+
+def test_angles_beyond_half_a_turn_do_not_jump():
+    run = synthetic(count=100)
+    angle = np.linspace(3.0, 3.4, 100)  # rad about z, over pi
+    zero = 0.0 * angle
+    run["bus_attitude"].values = np.column_stack([np.cos(angle / 2), zero, zero, np.sin(angle / 2)])
+    run["attitude_error"].values = np.column_stack([zero, zero, 2 * np.sin((angle - 3.3) / 2)])
+    bus, target = euler_angles(run)
+    assert bus[:, 2] == pytest.approx(np.rad2deg(angle))
+    assert target[:, 2] == pytest.approx(np.rad2deg(3.3))
+
+
+def test_thinning_keeps_the_extremes_of_every_stretch():
+    time = np.arange(100_003.0)
+    values = np.random.default_rng(0).normal(size=time.size)
+    values[[12_345, 67_890]] = 50.0, -60.0
+    t, v = thin(time, values, points=2000)
+    assert len(t) <= 2000
+    assert np.all(np.diff(t) > 0.0)
+    assert (t[0], t[-1]) == (0.0, time[-1])
+    assert (v.min(), v.max()) == (-60.0, 50.0)
+    for part in range(100):
+        inside = slice(1000 * part, 1000 * (part + 1))
+        shown = v[(t >= inside.start) & (t < inside.stop)]
+        assert shown.max() >= np.sort(values[inside])[-2]
+        assert shown.min() <= np.sort(values[inside])[1]
+
+
+def test_short_lines_are_not_thinned():
+    time = np.arange(10.0)
+    assert thin(time, time)[1] is time
+
+
+@pytest.mark.parametrize(
+    ("peak", "factor", "unit"),
+    [(3e-4, 1e6, r"$10^{-6}$ N"), (1e-3, 1e3, r"$10^{-3}$ N"), (5.0, 1.0, "N"), (0.0, 1.0, "N")],
+)
+def test_small_values_are_shown_in_powers_of_a_thousand(peak, factor, unit):
+    got = scaled(peak, "N")
+    assert got[0] == pytest.approx(factor)
+    assert got[1] == unit
