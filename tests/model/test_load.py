@@ -42,7 +42,9 @@ def test_profile_has_its_closed_form_and_names_its_corners(name):
 
 @pytest.mark.parametrize("frame", ["body", "inertial"])
 def test_wrench_turns_with_the_body_only_in_the_body_frame_but_its_point_always_does(frame):
-    load = Load("bus", frame, FORCE, TORQUE, POINT, Table(jnp.array([0.0, 1.0]), jnp.array([0, 2.0])))
+    load = Load(
+        "bus", frame, FORCE, TORQUE, POINT, Table(jnp.array([0.0, 1.0]), jnp.array([0, 2.0]))
+    )
     force, torque = load.wrench(jnp.asarray(0.75), R_NX)
     turn = R_NX if frame == "body" else np.eye(3)
     F, arm = 1.5 * turn @ FORCE, R_NX @ POINT

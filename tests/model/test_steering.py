@@ -177,9 +177,7 @@ def test_commanded_gimbal_rates_give_the_bus_the_torque_of_the_controller(seed):
     satellite = build_satellite(scenario)
     speed = satellite.cluster.rotor_speed * jnp.array([1.0, -0.9, 1.1, 0.8])
     q_BP = rotation_vector_to_quaternion(jnp.asarray(rng.normal(size=3)))
-    satellite = eqx.tree_at(
-        lambda s: (s.cluster.rotor_speed, s.q_BP), satellite, (speed, q_BP)
-    )
+    satellite = eqx.tree_at(lambda s: (s.cluster.rotor_speed, s.q_BP), satellite, (speed, q_BP))
     state = build_initial_state(scenario, satellite)
     gamma = jnp.asarray(rng.uniform(-0.5, 0.5, 4))
     state = eqx.tree_at(lambda s: s.gimbal_angle, state, gamma)

@@ -145,7 +145,5 @@ def test_derivatives_at_zero_rotation_are_those_of_the_exponential():
 def test_angular_velocity_of_small_turns_about_a_fixed_axis(angle):
     """Differentiating through the series and the closed form gives the same body rate."""
     axis = jnp.array([0.6, -0.48, 0.64])
-    q, rate = jax.jvp(
-        lambda x: rotation.rotation_vector_to_quaternion(x * axis), (angle,), (1.0,)
-    )
+    q, rate = jax.jvp(lambda x: rotation.rotation_vector_to_quaternion(x * axis), (angle,), (1.0,))
     np.testing.assert_allclose(rate, quaternion_rate(q, axis), atol=1e-12)

@@ -32,6 +32,7 @@ from quietbus.dynamics.state import State
 from quietbus.model.cmg import ClusterMoments, ControlMomentGyro
 from quietbus.model.satellite import Satellite
 from quietbus.model.steering import PseudoInverse
+from quietbus.spatial.inertia import point_inertia
 from quietbus.spatial.rotation import (
     quaternion_conjugate,
     quaternion_multiply,
@@ -125,6 +126,35 @@ def _indices(names: tuple[str, ...], wanted: list[str] | None, kind: str) -> lis
             raise KeyError(f"no {kind} '{name}'; the model has {', '.join(names)}")
         found += match
     return found
+
+
+def clamped(satellite: Satellite) -> Satellite:
+    """The satellite with a bus so heavy (1e12 times) that the base does not move."""
+    heavy = (1e12 * satellite.bus.mass, 1e12 * satellite.bus.I_BBcm_B)
+    return eqx.tree_at(lambda s: (s.bus.mass, s.bus.I_BBcm_B), satellite, heavy)
+
+
+def platform_inertia(
+    satellite: Satellite, gimbal_angle: np.ndarray
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """Mass [kg], mass centre [m] and inertia about it [kg m^2] of the plate with its CMGs.
+
+    Plate axes, imbalance averaged over the rotors' turns.
+    """
+    mass, c, J = (np.asarray(value) for value in _platform_moments(satellite, gimbal_angle))
+    center = c / mass
+    own = J - mass * (center @ center * np.eye(3) - np.outer(center, center))
+    return float(mass), center, own
+
+
+@eqx.filter_jit
+def _platform_moments(satellite, gimbal_angle):
+    still = jnp.zeros(len(satellite.cluster.rotor_mass))
+    moments = ClusterMoments.expand(satellite.cluster).averaged()
+    carried = moments.at(jnp.asarray(gimbal_angle), still, still, still)
+    plate = satellite.plate
+    J = carried.J + plate.I_PPcm_P + point_inertia(plate.mass, plate.p_PPcm_P)
+    return carried.mass + plate.mass, carried.c + plate.mass * plate.p_PPcm_P, J
 
 
 class OperatingPoint(NamedTuple):

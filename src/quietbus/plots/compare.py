@@ -22,12 +22,12 @@ from quietbus.plots.signals import (
 from quietbus.plots.style import (
     COLOURS,
     DASHES,
+    draw_line,
     explain,
     new_figure,
     scaled,
     share_legend,
     style,
-    thin,
 )
 from quietbus.results import scenario_of, summarize
 
@@ -197,7 +197,8 @@ def attitude(runs: Mapping[str, xr.Dataset]) -> Figure:
         for i, axes in enumerate(panels):
             _line(axes, runs[mount], bus[:, i], mount)
             if mount == "isolated":
-                axes.plot(*thin(time, target[:, i]), "k:", linewidth=0.9, label="target")
+                look = {"color": "k", "linestyle": ":", "linewidth": 0.9, "label": "target"}
+                draw_line(axes, time, target[:, i], **look)
     for name, axes in zip(ANGLES, panels, strict=True):
         axes.set_ylabel(f"{name} [deg]")
     panels[-1].set_xlabel(TIME)
@@ -209,8 +210,10 @@ def _line(axes: Axes, run: xr.Dataset, values: np.ndarray, mount: str) -> None:
     """A run's line: the one without the platform wide, so that both are seen where they agree."""
     label, line = LINES[mount]
     width, alpha = (3.0, 0.6) if mount == "rigid" else (1.3, 1.0)
-    axes.plot(
-        *thin(run["time"].to_numpy(), values),
+    draw_line(
+        axes,
+        run["time"].to_numpy(),
+        values,
         color=line["color"],
         linewidth=width,
         alpha=alpha,

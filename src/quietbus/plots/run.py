@@ -21,13 +21,13 @@ from quietbus.plots.style import (
     COLOURS,
     DASHES,
     MARKERS,
+    draw_line,
     draw_lines,
     explain,
     new_figure,
     scaled,
     share_legend,
     style,
-    thin,
 )
 from quietbus.results import aliasing, scenario_of
 
@@ -61,7 +61,7 @@ def attitude(run: xr.Dataset) -> Figure:
     draw_lines(axes, time, bus, ANGLES)
     for i in range(3):
         label = "target" if i == 0 else None
-        axes.plot(*thin(time, target[:, i]), "k:", linewidth=0.9, label=label)
+        draw_line(axes, time, target[:, i], color="k", linestyle=":", linewidth=0.9, label=label)
     axes.set(xlabel=TIME, ylabel="Euler angle, 3-2-1 [deg]")
     share_legend(figure, axes)
     return figure
@@ -152,7 +152,7 @@ def control(run: xr.Dataset) -> Figure:
     error.set_ylabel("attitude error [deg]")
     draw_lines(torque, time, run["control_torque"].to_numpy(), AXES)
     torque.set_ylabel("torque [N m]")
-    measure.plot(*thin(time, run["singularity_measure"].to_numpy()), color="black")
+    draw_line(measure, time, run["singularity_measure"].to_numpy(), color="black")
     measure.set(xlabel=TIME, ylabel="singularity\nmeasure [-]")
     measure.set_ylim(0.0, 1.1 * max(measure.get_ylim()[1], 1e-6))
     share_legend(figure, error)
@@ -215,6 +215,8 @@ def _two_rows(run: xr.Dataset, title: str, rows: list[tuple[np.ndarray, str]], w
         names = [f"{what} {number}" for number in range(values.shape[1])]
         draw_lines(axes, run["time"].to_numpy(), values, names)
         axes.set_ylabel(label)
+    if panels[0].collections:
+        panels[0].set_title("bands: vibration, peak to peak")
     panels[-1].set_xlabel(TIME)
     share_legend(figure, panels[0])
     return figure

@@ -1,0 +1,93 @@
+"""Modes of the satellite on its platform: frequency, damping, shape."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from quietbus.dynamics.linearize import LinearModel
+
+RIGID_BODY = (
+    1e-4  # [rad/s] slower is a rigid-body motion: a double pole at zero, spread by rounding
+)
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One oscillating or decaying mode."""
+
+    frequency_hz: float  # undamped: abs(pole) / 2 pi
+    damped_frequency_hz: float
+    damping: float  # [-] of critical
+    pole: complex  # [rad/s], the one with non-negative imaginary part
+    shape: np.ndarray  # (12,) complex: plate position, rotation; bus position, rotation; largest 1
+    name: str  # what moves most, and along or about what
+
+    def to_dict(self) -> dict[str, object]:
+        """For JSON; the shape as real and imaginary parts."""
+        return {
+            "name": self.name,
+            "frequency_hz": self.frequency_hz,
+            "damped_frequency_hz": self.damped_frequency_hz,
+            "damping": self.damping,
+            "pole": [self.pole.real, self.pole.imag],
+            "shape": {"real": self.shape.real.tolist(), "imag": self.shape.imag.tolist()},
+        }
+
+
+_PLATE = [f"plate_{kind}_{axis}" for kind in ("position", "attitude") for axis in "xyz"]
+_BUS = [f"bus_{kind}_{axis}" for kind in ("position", "attitude") for axis in "xyz"]
+
+
+def free_modes(model: LinearModel) -> list[Mode]:
+    """Elastic modes of the free satellite, gimbals held, by rising frequency.
+
+    Args:
+        model: linearised with ``actuator="ideal"``, so that gimbals take no part.
+    """
+    return _modes(model.A, list(model.states))
+
+
+def fixed_base_modes(model: LinearModel) -> list[Mode]:
+    """Modes of the plate with the bus held."""
+    kept = [i for i, name in enumerate(model.states) if name.startswith("plate_")]
+    states = [model.states[i] for i in kept]
+    return _modes(model.A[np.ix_(kept, kept)], states)
+
+
+def _modes(A: np.ndarray, states: list[str]) -> list[Mode]:
+    # the plate's position is relative to the bus's; shapes are shown in space
+    rows = np.zeros((12, len(states)))
+    for i, name in enumerate([*_PLATE, *_BUS]):
+        if name in states:
+            rows[i, states.index(name)] = 1.0
+    for i in range(3):
+        if _BUS[i] in states:
+            rows[i, states.index(_BUS[i])] = 1.0
+    poles, vectors = np.linalg.eig(A)
+    found = []
+    for pole, vector in zip(poles, vectors.T, strict=True):
+        if pole.imag < 0.0 or abs(pole) < RIGID_BODY:
+            continue
+        shape = rows @ vector
+        if np.max(np.abs(shape)) == 0.0:
+            continue
+        shape = shape / shape[np.argmax(np.abs(shape))]
+        found.append(
+            Mode(
+                frequency_hz=float(abs(pole) / (2.0 * np.pi)),
+                damped_frequency_hz=float(pole.imag / (2.0 * np.pi)),
+                damping=float(-pole.real / abs(pole)),
+                pole=complex(pole),
+                shape=shape,
+                name=_name(shape),
+            )
+        )
+    return sorted(found, key=lambda mode: mode.frequency_hz)
+
+
+def _name(shape: np.ndarray) -> str:
+    """The plate's motion relative to the bus, in words."""
+    moved = np.abs(shape[:6] - shape[6:])
+    kinds = [*(f"translation {a}" for a in "xyz"), *(f"rotation {a}" for a in "xyz")]
+    parts = [kind for kind, size in zip(kinds, moved / moved.max(), strict=True) if size > 0.3]
+    return " + ".join(parts)

@@ -1,0 +1,240 @@
+"""Everything that linear analysis says of a scenario (``quietbus analyze``)."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import equinox as eqx
+import numpy as np
+
+from quietbus.analysis.channels import Channels, channels, hexapod_isolator, json_ready
+from quietbus.analysis.coupled import (
+    ControlledSatellite,
+    CoupledAnalysis,
+    analyze_coupled,
+    controlled,
+)
+from quietbus.analysis.loop import (
+    PID,
+    DesignRule,
+    Loop,
+    LoopAnalysis,
+    analyze_loop,
+    attitude_loop,
+    corner_rule,
+)
+from quietbus.analysis.modes import Mode, fixed_base_modes, free_modes
+from quietbus.analysis.transmissibility import Transmissibility, transmissibility
+from quietbus.build import build_satellite
+from quietbus.dynamics.linearize import (
+    Actuator,
+    LinearModel,
+    OperatingPoint,
+    clamped,
+    linearize,
+    platform_inertia,
+)
+from quietbus.model.satellite import Satellite
+from quietbus.scenario import Scenario
+
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class Study:
+    """Linear analysis of one scenario at rest, at given gimbal angles; parts made when asked for.
+
+    ``loops``, ``coupled`` and what follows from them are None without attitude control.
+    """
+
+    scenario: Scenario
+    gimbal_angle: np.ndarray  # (cmg,) [rad]
+
+    @cached_property
+    def point(self) -> OperatingPoint:
+        """At rest."""
+        return OperatingPoint(np.zeros(3), self.gimbal_angle)
+
+    @cached_property
+    def satellite(self) -> Satellite:
+        """Isolated, whatever the scenario's mount: the analysis is of the platform."""
+        return build_satellite(self.scenario, "isolated")
+
+    @cached_property
+    def pid(self) -> PID | None:
+        """The scenario's controller."""
+        control = self.scenario.control
+        return control and PID(control.pid.kp, control.pid.ki, control.pid.kd)
+
+    def linear(self, actuator: Actuator = "servo") -> LinearModel:
+        """The free satellite, linearised."""
+        return linearize(self.satellite, self.point, actuator)
+
+    @cached_property
+    def channels(self) -> Channels:
+        """Torque channels of the platform on a fixed base, massless legs (eq. 31-33)."""
+        isolator = self.scenario.isolator
+        mass, center, inertia = platform_inertia(self.satellite, self.gimbal_angle)
+        legs = self.satellite.legs
+        return channels(
+            hexapod_isolator(
+                isolator.legs.upper_joints,
+                isolator.legs.lower_joints,
+                isolator.separation,
+                mass,
+                inertia,
+                center,
+                np.asarray(legs.stiffness),
+                np.asarray(legs.damping),
+            )
+        )
+
+    @cached_property
+    def loops(self) -> dict[str, Loop] | None:
+        """Open loops per axis as in the paper: PID, channel, 1/(I s^2) with the bus's inertia."""
+        if self.pid is None:
+            return None
+        inertia = np.diag(np.asarray(self.scenario.bus.inertia))
+        return {
+            axis: attitude_loop(channel.numerator, channel.denominator, inertia[i], self.pid)
+            for i, (axis, channel) in enumerate(zip(AXES, self.channels, strict=True))
+        }
+
+    @cached_property
+    def loop_analyses(self) -> dict[str, LoopAnalysis] | None:
+        """Ranges and margins per axis."""
+        return self.loops and {axis: analyze_loop(loop) for axis, loop in self.loops.items()}
+
+    @cached_property
+    def rules(self) -> dict[str, DesignRule] | None:
+        """Corner over bandwidth per axis."""
+        return self.loop_analyses and {
+            axis: corner_rule(channel.peak_frequency_hz, self.loop_analyses[axis].bandwidth_hz)
+            for axis, channel in zip(AXES, self.channels, strict=True)
+        }
+
+    @cached_property
+    def controlled(self) -> ControlledSatellite | None:
+        """The loop around the whole satellite, with gimbal servos if the gimbals are steered."""
+        return self.pid and controlled(self.linear(self._actuator), self.pid)
+
+    @property
+    def _actuator(self) -> Actuator:
+        return "ideal" if self.satellite.steering is None else "servo"
+
+    @cached_property
+    def coupled(self) -> CoupledAnalysis | None:
+        """Ranges and margins of all axes together."""
+        return self.controlled and analyze_coupled(self.controlled)
+
+    def truth(self) -> list[dict[str, Any]] | None:
+        """What the per-axis analysis says, and what is so: one simplification lifted at a time."""
+        if self.pid is None or self.loop_analyses is None:
+            return None
+        rows = [
+            {
+                "case": f"per axis, {axis}: base fixed, massless legs, ideal gimbals",
+                "stable_gain_range": analysis.stable_gain_range,
+                "gain_margins_db": analysis.gain_margins_db,
+            }
+            for axis, analysis in self.loop_analyses.items()
+        ]
+        bare = without_leg_mass(without_friction(self.satellite))
+        cases: list[tuple[str, Satellite, Actuator]] = [
+            ("free bus, all axes, platform at the bus mass centre", at_height(bare, 0.0), "ideal"),
+            ("the same, platform where it is", bare, "ideal"),
+            ("with joint friction", without_leg_mass(self.satellite), "ideal"),
+            ("with leg mass", self.satellite, "ideal"),
+        ]
+        if self.satellite.steering is not None:
+            cases.append(("with gimbal servo and rotor momentum: all", self.satellite, "servo"))
+        for case, satellite, actuator in cases:
+            result = analyze_coupled(
+                controlled(linearize(satellite, self.point, actuator), self.pid)
+            )
+            rows.append(
+                {
+                    "case": case,
+                    "stable_gain_range": result.stable_gain_range,
+                    "gain_margins_db": result.gain_margins_db,
+                    "disk_margin": result.disk_margin,
+                }
+            )
+        return rows
+
+    @cached_property
+    def modes(self) -> dict[str, list[Mode]]:
+        """Modes with the base fixed and of the free satellite, gimbals held."""
+        fixed = linearize(clamped(self.satellite), self.point, "ideal")
+        return {"fixed_base": fixed_base_modes(fixed), "free": free_modes(self.linear("ideal"))}
+
+    def transmissibility(self, frequency_hz: np.ndarray) -> Transmissibility:
+        """Transmissibility of the platform on the free satellite at frequencies [Hz]."""
+        mass, center, inertia = platform_inertia(self.satellite, self.gimbal_angle)
+        rigid = replace(self.satellite, mount="rigid")
+        return transmissibility(
+            self.linear("ideal"),
+            linearize(rigid, self.point, "ideal"),
+            _spatial_inertia(mass, center, inertia),
+            frequency_hz,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON, with the keys of the interface."""
+        coupled = self.coupled
+        return json_ready(
+            {
+                "scenario": self.scenario.name,
+                "gimbal_angle": self.gimbal_angle.tolist(),
+                "channels": self.channels.to_dict() | {"verdict": self.channels.verdict},
+                "loop": self.loop_analyses
+                and {axis: a.to_dict() for axis, a in self.loop_analyses.items()},
+                "rules": self.rules and {axis: rule.to_dict() for axis, rule in self.rules.items()},
+                "coupled": coupled
+                and {
+                    "gain": coupled.gain,
+                    "stable": coupled.stable,
+                    "stable_gain_range": coupled.stable_gain_range,
+                    "gain_margin_db": coupled.gain_margin_db,
+                    "gain_margins_db": coupled.gain_margins_db,
+                    "disk_margin": coupled.disk_margin,
+                    "disk_gain_margin_db": coupled.disk_gain_margin_db,
+                    "disk_phase_margin_deg": coupled.disk_phase_margin_deg,
+                    "poles": [[pole.real, pole.imag] for pole in coupled.poles.tolist()],
+                },
+                "truth": self.truth(),
+                "modes": {
+                    base: [mode.to_dict() for mode in modes] for base, modes in self.modes.items()
+                },
+            }
+        )
+
+
+def without_leg_mass(satellite: Satellite) -> Satellite:
+    """The satellite with massless legs."""
+    masses = lambda s: [  # noqa: E731
+        getattr(part, name)
+        for part in (s.legs.upper, s.legs.lower)
+        for name in ("mass", "transverse_inertia", "axial_inertia")
+    ]
+    return eqx.tree_at(masses, satellite, [0.0 * value for value in masses(satellite)])
+
+
+def without_friction(satellite: Satellite) -> Satellite:
+    """The satellite with joints that turn freely."""
+    joints = lambda s: (s.legs.spherical_friction, s.legs.universal_friction)  # noqa: E731
+    return eqx.tree_at(joints, satellite, tuple(0.0 * value for value in joints(satellite)))
+
+
+def at_height(satellite: Satellite, height: float) -> Satellite:
+    """The satellite with its platform moved along bus z, so that its plate is at ``height`` [m]."""
+    shift = np.array([0.0, 0.0, height - float(satellite.p_BP_B[2])])
+    places = lambda s: (s.p_BP_B, s.legs.p_BA_B)  # noqa: E731
+    return eqx.tree_at(places, satellite, tuple(value + shift for value in places(satellite)))
+
+
+def _spatial_inertia(mass: float, center: np.ndarray, inertia: np.ndarray) -> np.ndarray:
+    x, y, z = mass * center
+    c = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    about_origin = inertia + mass * (center @ center * np.eye(3) - np.outer(center, center))
+    return np.block([[mass * np.eye(3), -c], [c, about_origin]])

@@ -1,0 +1,224 @@
+"""The documentation: its code runs, its links lead somewhere, its tables are those of the code."""
+
+import json
+import re
+import types
+import typing
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+
+import quietbus as qb
+from quietbus import cli
+from quietbus.results import JOINT_VARIABLES, VARIABLES
+from quietbus.scenario.base import Part
+from quietbus.scenario.control import LAWS
+from quietbus.scenario.hardware import Unit
+from quietbus.scenario.units import Quantity
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
+FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+
+
+def _text(name: str) -> str:
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
+def _name(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
+
+
+def _code_blocks():
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        for match in FENCE.finditer(text):
+            if match[1] == "python":
+                line = text[: match.start()].count("\n") + 2
+                yield pytest.param(page, line, match[2], id=f"{_name(page)}:{line}")
+
+
+def _rows(text: str, heading: tuple[str, ...]) -> list[list[str]]:
+    """Rows of all tables in a page that have the given heading."""
+    rows, inside = [], False
+    for line in text.splitlines():
+        if not line.startswith("|"):
+            inside = False
+            continue
+        cells = [cell.strip() for cell in line.strip().strip("|").split("|")]
+        if tuple(cells) == heading:
+            inside = True
+        elif inside and set(line) - set("|- "):
+            assert len(cells) == len(heading), line
+            rows.append(cells)
+    assert rows, f"no table {heading}"
+    return rows
+
+
+def _unquoted(cell: str) -> str:
+    return cell.removeprefix("`").removesuffix("`")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("page", "line", "code"), _code_blocks())
+def test_python_in_the_documentation_runs(page, line, code, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    # blank lines before the code, so that a failure points into the page
+    exec(compile("\n" * (line - 1) + code, str(page), "exec"), {"__name__": "__docs__"})
+    assert capsys.readouterr().out
+
+
+@pytest.mark.parametrize("page", PAGES, ids=_name)
+def test_links_to_files_and_headings_lead_somewhere(page):
+    text = FENCE.sub("", page.read_text(encoding="utf-8"))
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if re.match(r"\w+:", target):
+            continue
+        path, _, anchor = target.partition("#")
+        file = (page.parent / path).resolve() if path else page
+        assert file.is_relative_to(ROOT), target
+        assert file.exists(), f"{_name(page)} links to {target}"
+        if anchor:
+            headings = re.findall(r"^#+ (.*)$", file.read_text(encoding="utf-8"), re.MULTILINE)
+            anchors = [re.sub(r"[^\w\- ]", "", h).lower().replace(" ", "-") for h in headings]
+            assert anchor in anchors, f"{_name(page)} links to {target}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=_name)
+def test_source_files_named_in_the_documentation_exist(page):
+    for name in re.findall(r"`([\w/]+\.py)`", page.read_text(encoding="utf-8")):
+        places = [ROOT / name, ROOT / "src/quietbus" / name, ROOT / "src/quietbus/dynamics" / name]
+        assert any(place.is_file() for place in places), f"{_name(page)} names {name}"
+
+
+def test_documents_named_in_the_source_exist():
+    for source in (ROOT / "src").rglob("*.py"):
+        for name in re.findall(r"\bdocs/[\w./-]+\w", source.read_text(encoding="utf-8")):
+            assert (ROOT / name).is_file(), f"{source} names {name}"
+
+
+def test_equations_of_the_theory_are_numbered_in_order():
+    theory = _text("docs/theory.md")
+    numbers = [int(number) for number in re.findall(r"\\tag\{(\d+)\}", theory)]
+    assert numbers == list(range(1, len(numbers) + 1))
+    assert theory.count("$$") % 2 == 0
+    for named in re.findall(r"theory\.md, eq\. (\d+)", _text("docs/notation.md")):
+        assert int(named) in numbers
+
+
+def test_results_page_has_every_variable_with_dimensions_and_unit():
+    heading = ("variable", "dimensions after `time`", "unit", "meaning", "frame")
+    documented = {
+        _unquoted(name): (tuple(dimensions.split(", ")) if dimensions else (), unit)
+        for name, dimensions, unit, _, _ in _rows(_text("docs/results.md"), heading)
+    }
+    described = {name: (dims, unit) for name, (dims, unit, _) in (VARIABLES | JOINT_VARIABLES).items()}
+    assert documented == described
+
+
+@pytest.mark.slow
+def test_results_page_has_every_dimension_and_attribute_of_a_run():
+    page = _text("docs/results.md")
+    run = qb.simulate("zhang2012", duration=0.01)
+    attributes = {_unquoted(name) for name, _ in _rows(page, ("attribute", "meaning"))}
+    assert attributes == set(run.attrs)
+    dimensions = {_unquoted(row[0]) for row in _rows(page, ("dimension", "length", "labels"))}
+    assert dimensions == set(run.sizes)
+    for variable in run.data_vars.values():
+        assert variable.attrs.keys() == {"units", "long_name"}
+
+
+def test_results_page_has_every_number_of_a_summary():
+    page = _text("docs/results.md")
+    for name in qb.summarize.__annotations__["return"].__dataclass_fields__:
+        assert f"`{name}`" in page or name == "residual_note", name
+
+
+def test_readme_lists_the_commands():
+    rows = _rows(_text("README.md"), ("command", "does"))
+    documented = {re.search(r"quietbus (\w+)", row[0])[1] for row in rows if "quietbus" in row[0]}
+    assert documented == set(typer.main.get_command(cli.app).commands)
+
+
+def test_readme_names_the_built_in_scenarios_and_the_settings():
+    readme = _text("README.md")
+    for name in qb.scenario.load.builtin_names():
+        assert f"`{name}`" in readme
+    settings = _text("src/quietbus/jaxconfig.py")
+    for name, _, _ in _rows(readme, ("setting", "value", "why")):
+        assert _unquoted(name) in settings
+    for name in re.findall(r'os\.environ(?:\.\w+\(|\[)"(\w+)"', settings):
+        assert f"`{name}`" in readme
+
+
+def test_scenario_page_has_every_key_with_unit_and_default():
+    page = _text("docs/scenario.md")
+    rows = _rows(page, ("key", "unit", "default", "meaning"))
+    documented = {_unquoted(key): (unit, default) for key, unit, default, _ in rows}
+    assert len(documented) == len(rows), "a key is documented twice"
+    keys = dict(_keys(qb.Scenario))
+    mappings = {key for key, (holds, _, _) in keys.items() if holds}
+    assert documented.keys() - keys.keys() == set()
+    assert {key for key in mappings if f"`{key}`" not in page} == set()
+    assert keys.keys() - mappings - documented.keys() == set()
+    for key, (unit, default) in documented.items():
+        _, true_unit, true_default = keys[key]
+        assert unit == true_unit, key
+        assert _same_default(_unquoted(default), true_default), f"{key}: {true_default}"
+
+
+def test_scenario_page_names_every_choice():
+    page = _text("docs/scenario.md")
+    for word in (*LAWS, "isolated", "rigid", "bus", "plate", "body", "inertial", "constant"):
+        assert f"`{word}`" in page
+
+
+def _keys(model: type[Part], prefix: str = ""):
+    """Every key below a mapping: dotted path, whether it holds a mapping, unit, default."""
+    hints = typing.get_type_hints(model, include_extras=True)
+    for name, field in model.model_fields.items():
+        parts, units, listed = _contents(hints[name])
+        unit = units[0] or "-" if units else "-" if hints[name] in _COUNTS else ""
+        default = "required" if field.is_required() else field.default
+        key = prefix + name
+        # a unit's rotor and gimbal body have the keys of the cluster's
+        leaf = not parts or model is Unit or listed and key == "loads"
+        yield key, (not leaf, unit, default)
+        if parts and model is not Unit:
+            for part in parts:
+                yield from _keys(part, f"{key}[]." if listed else f"{key}.")
+
+
+_COUNTS = {typing.get_type_hints(qb.scenario.hardware.Pyramid, include_extras=True)["units"]}
+
+
+def _contents(annotation):
+    """Mappings and units inside an annotation, and whether it is a list of mappings alone."""
+    parts, units, listed, left = [], [], False, [annotation]
+    while left:
+        item = left.pop(0)
+        origin, arguments = typing.get_origin(item), typing.get_args(item)
+        if isinstance(item, type) and not isinstance(item, types.GenericAlias):
+            parts += [item] if issubclass(item, Part) and item not in parts else []
+        elif isinstance(item, Quantity):
+            units.append(item.unit)
+        elif origin is tuple and arguments[-1] is Ellipsis and arguments[0] not in parts:
+            listed = listed or isinstance(arguments[0], type) and issubclass(arguments[0], Part)
+            left[:0] = arguments[:1]
+        elif origin is not typing.Literal:
+            left[:0] = [*arguments, *getattr(item, "__metadata__", ())]
+    return parts, units, listed
+
+
+def _same_default(documented: str, default) -> bool:
+    if default is None or isinstance(default, str):
+        return documented == (default or "none")
+    try:
+        value = json.loads(documented)
+    except ValueError:
+        return False
+    if isinstance(default, bool):
+        return value is default
+    return np.shape(value) == np.shape(default) and np.allclose(value, default, rtol=1e-4)
