@@ -20,7 +20,7 @@ lint: $(VENV)/developed
 	$(BIN)/lint-imports
 
 bench: $(VENV)/developed
-	$(BIN)/python benchmarks/run.py
+	@for each in benchmarks/*.py; do echo "== $$each"; $(BIN)/python $$each; done
 
 $(VENV)/installed: pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "quietbus needs Python 3.11 or newer; set PYTHON=...")'

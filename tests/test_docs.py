@@ -2,7 +2,6 @@
 
 import json
 import re
-import types
 import typing
 from pathlib import Path
 
@@ -12,8 +11,9 @@ import typer
 
 import quietbus as qb
 from quietbus import cli
-from quietbus.results import JOINT_VARIABLES, VARIABLES
-from quietbus.scenario.base import Part
+from quietbus.results import JOINT_VARIABLES, VARIABLES, Summary
+from quietbus.scenario import builtin_names
+from quietbus.scenario.base import Part, UnitCount
 from quietbus.scenario.control import LAWS
 from quietbus.scenario.hardware import Unit
 from quietbus.scenario.units import Quantity
@@ -62,7 +62,7 @@ def _unquoted(cell: str) -> str:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("page", "line", "code"), _code_blocks())
+@pytest.mark.parametrize(("page", "line", "code"), list(_code_blocks()))
 def test_python_in_the_documentation_runs(page, line, code, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     # blank lines before the code, so that a failure points into the page
@@ -114,7 +114,8 @@ def test_results_page_has_every_variable_with_dimensions_and_unit():
         _unquoted(name): (tuple(dimensions.split(", ")) if dimensions else (), unit)
         for name, dimensions, unit, _, _ in _rows(_text("docs/results.md"), heading)
     }
-    described = {name: (dims, unit) for name, (dims, unit, _) in (VARIABLES | JOINT_VARIABLES).items()}
+    variables = VARIABLES | JOINT_VARIABLES
+    described = {name: (dims, unit) for name, (dims, unit, _) in variables.items()}
     assert documented == described
 
 
@@ -132,7 +133,7 @@ def test_results_page_has_every_dimension_and_attribute_of_a_run():
 
 def test_results_page_has_every_number_of_a_summary():
     page = _text("docs/results.md")
-    for name in qb.summarize.__annotations__["return"].__dataclass_fields__:
+    for name in Summary.__dataclass_fields__:
         assert f"`{name}`" in page or name == "residual_note", name
 
 
@@ -144,7 +145,7 @@ def test_readme_lists_the_commands():
 
 def test_readme_names_the_built_in_scenarios_and_the_settings():
     readme = _text("README.md")
-    for name in qb.scenario.load.builtin_names():
+    for name in builtin_names():
         assert f"`{name}`" in readme
     settings = _text("src/quietbus/jaxconfig.py")
     for name, _, _ in _rows(readme, ("setting", "value", "why")):
@@ -159,7 +160,7 @@ def test_scenario_page_has_every_key_with_unit_and_default():
     documented = {_unquoted(key): (unit, default) for key, unit, default, _ in rows}
     assert len(documented) == len(rows), "a key is documented twice"
     keys = dict(_keys(qb.Scenario))
-    mappings = {key for key, (holds, _, _) in keys.items() if holds}
+    mappings = {key for key, (is_mapping, _, _) in keys.items() if is_mapping}
     assert documented.keys() - keys.keys() == set()
     assert {key for key in mappings if f"`{key}`" not in page} == set()
     assert keys.keys() - mappings - documented.keys() == set()
@@ -183,15 +184,14 @@ def _keys(model: type[Part], prefix: str = ""):
         unit = units[0] or "-" if units else "-" if hints[name] in _COUNTS else ""
         default = "required" if field.is_required() else field.default
         key = prefix + name
-        # a unit's rotor and gimbal body have the keys of the cluster's
-        leaf = not parts or model is Unit or listed and key == "loads"
-        yield key, (not leaf, unit, default)
-        if parts and model is not Unit:
-            for part in parts:
-                yield from _keys(part, f"{key}[]." if listed else f"{key}.")
+        if model is Unit:
+            parts = []  # its rotor and gimbal body have the keys of the cluster's
+        yield key, (bool(parts), unit, default)
+        for part in parts:
+            yield from _keys(part, f"{key}[]." if listed else f"{key}.")
 
 
-_COUNTS = {typing.get_type_hints(qb.scenario.hardware.Pyramid, include_extras=True)["units"]}
+_COUNTS = {UnitCount}  # whole numbers
 
 
 def _contents(annotation):
@@ -200,16 +200,21 @@ def _contents(annotation):
     while left:
         item = left.pop(0)
         origin, arguments = typing.get_origin(item), typing.get_args(item)
-        if isinstance(item, type) and not isinstance(item, types.GenericAlias):
-            parts += [item] if issubclass(item, Part) and item not in parts else []
+        if origin is tuple and arguments[-1] is Ellipsis:
+            # one part for all legs or a list of them is written once, as one part
+            listed = listed or (_is_part(arguments[0]) and arguments[0] not in parts)
+            left.insert(0, arguments[0])
+        elif _is_part(item):
+            parts += [item] if item not in parts else []
         elif isinstance(item, Quantity):
             units.append(item.unit)
-        elif origin is tuple and arguments[-1] is Ellipsis and arguments[0] not in parts:
-            listed = listed or isinstance(arguments[0], type) and issubclass(arguments[0], Part)
-            left[:0] = arguments[:1]
         elif origin is not typing.Literal:
             left[:0] = [*arguments, *getattr(item, "__metadata__", ())]
     return parts, units, listed
+
+
+def _is_part(item) -> bool:
+    return isinstance(item, type) and typing.get_origin(item) is None and issubclass(item, Part)
 
 
 def _same_default(documented: str, default) -> bool:

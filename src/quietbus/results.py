@@ -57,6 +57,7 @@ JOINT_VARIABLES = {
     ),
     "universal_force": (("leg", "axis"), "N", "base on leg at the universal joint, inertial frame"),
     "universal_moment": (("leg",), "N m", "base on leg at the universal joint, about its h axis"),
+    "universal_axis": (("leg", "axis"), "1", "axis of the universal moment, inertial frame"),
 }
 
 

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from importlib.metadata import version
 from typing import Any
 
 import equinox as eqx
@@ -13,6 +14,7 @@ from quietbus.analysis.coupled import (
     CoupledAnalysis,
     analyze_coupled,
     controlled,
+    stable_gain_range,
 )
 from quietbus.analysis.loop import (
     PID,
@@ -22,6 +24,7 @@ from quietbus.analysis.loop import (
     analyze_loop,
     attitude_loop,
     corner_rule,
+    nearest_range,
 )
 from quietbus.analysis.modes import Mode, fixed_base_modes, free_modes
 from quietbus.analysis.transmissibility import Transmissibility, transmissibility
@@ -36,6 +39,7 @@ from quietbus.dynamics.linearize import (
 )
 from quietbus.model.satellite import Satellite
 from quietbus.scenario import Scenario
+from quietbus.spatial.rotation import quaternion_to_matrix
 
 AXES = ("x", "y", "z")
 
@@ -44,7 +48,8 @@ AXES = ("x", "y", "z")
 class Study:
     """Linear analysis of one scenario at rest, at given gimbal angles; parts made when asked for.
 
-    ``loops``, ``coupled`` and what follows from them are None without attitude control.
+    ``loops``, ``coupled`` and what follows from them are None without attitude control. Axes are
+    those of the bus.
     """
 
     scenario: Scenario
@@ -62,9 +67,28 @@ class Study:
 
     @cached_property
     def pid(self) -> PID | None:
-        """The scenario's controller."""
+        """The scenario's controller; None without one, or if all its gains are zero."""
         control = self.scenario.control
-        return control and PID(control.pid.kp, control.pid.ki, control.pid.kd)
+        pid = control and PID(control.pid.kp, control.pid.ki, control.pid.kd)
+        return pid if pid and pid.gain else None
+
+    @cached_property
+    def notes(self) -> list[str]:
+        """What the user has to know of how the scenario was analysed."""
+        notes = []
+        if self.scenario.isolator.mount == "rigid":
+            notes.append("The scenario's mount is rigid; what is analysed is the platform's.")
+        if self.pid is None:
+            which = "has no control" if self.scenario.control is None else "has gains of zero only"
+            notes.append(f"The scenario {which}: no loop to analyse, those parts are empty.")
+        elif self.satellite.steering is None:
+            notes.append(
+                "The scenario holds the gimbals (steering: none), so that a run feels no control; "
+                "the loop is analysed as if the plate received the torque that is asked for."
+            )
+        if self.channels.largest_coupling > 0.0:
+            notes.append(self.channels.verdict)
+        return notes
 
     def linear(self, actuator: Actuator = "servo") -> LinearModel:
         """The free satellite, linearised."""
@@ -73,19 +97,21 @@ class Study:
     @cached_property
     def channels(self) -> Channels:
         """Torque channels of the platform on a fixed base, massless legs (eq. 31-33)."""
-        isolator = self.scenario.isolator
+        isolator, legs = self.scenario.isolator, self.satellite.legs
         mass, center, inertia = platform_inertia(self.satellite, self.gimbal_angle)
-        legs = self.satellite.legs
+        base = np.asarray(isolator.offset)
+        R_BP = np.asarray(quaternion_to_matrix(self.satellite.q_BP))
+        plate = np.asarray(self.satellite.p_BP_B) - base
         return channels(
-            hexapod_isolator(
-                isolator.legs.upper_joints,
-                isolator.legs.lower_joints,
-                isolator.separation,
-                mass,
-                inertia,
-                center,
-                np.asarray(legs.stiffness),
-                np.asarray(legs.damping),
+            hexapod_isolator(  # all from the base plate's centre, in bus axes
+                upper_joints=plate + np.asarray(legs.p_PU_P) @ R_BP.T,
+                lower_joints=np.asarray(legs.p_BA_B) - base,
+                separation=0.0,
+                mass=mass,
+                inertia=R_BP @ inertia @ R_BP.T,
+                center_of_mass=plate + R_BP @ center,
+                stiffness=np.asarray(legs.stiffness),
+                damping=np.asarray(legs.damping),
             )
         )
 
@@ -127,6 +153,7 @@ class Study:
         """Ranges and margins of all axes together."""
         return self.controlled and analyze_coupled(self.controlled)
 
+    @cached_property
     def truth(self) -> list[dict[str, Any]] | None:
         """What the per-axis analysis says, and what is so: one simplification lifted at a time."""
         if self.pid is None or self.loop_analyses is None:
@@ -139,15 +166,22 @@ class Study:
             }
             for axis, analysis in self.loop_analyses.items()
         ]
-        bare = without_leg_mass(without_friction(self.satellite))
+        still = without_rotation(self.satellite)
+        light = without_leg_mass(still)
+        bare = without_friction(light)
         cases: list[tuple[str, Satellite, Actuator]] = [
-            ("free bus, all axes, platform at the bus mass centre", at_height(bare, 0.0), "ideal"),
+            (
+                "free bus, all axes, platform at the height of its mass centre",
+                at_height(bare, 0.0),
+                "ideal",
+            ),
             ("the same, platform where it is", bare, "ideal"),
-            ("with joint friction", without_leg_mass(self.satellite), "ideal"),
-            ("with leg mass", self.satellite, "ideal"),
+            ("with joint friction", light, "ideal"),
+            ("with leg mass", still, "ideal"),
+            ("with rotor momentum", self.satellite, "ideal"),
         ]
         if self.satellite.steering is not None:
-            cases.append(("with gimbal servo and rotor momentum: all", self.satellite, "servo"))
+            cases.append(("with gimbal servo: all", self.satellite, "servo"))
         for case, satellite, actuator in cases:
             result = analyze_coupled(
                 controlled(linearize(satellite, self.point, actuator), self.pid)
@@ -179,30 +213,41 @@ class Study:
             frequency_hz,
         )
 
+    def limits_by_height(self, heights: np.ndarray) -> np.ndarray:
+        """Ends of the coupled loop's stable range (height, low and high), platform moved along z.
+
+        NaN where no gain is stable; infinite for no upper end.
+
+        Args:
+            heights: (n,) of the plate's origin over the bus mass centre [m].
+        """
+        if self.pid is None:
+            raise ValueError("limits_by_height: the scenario has no control")
+        ends = []
+        for height in heights:
+            model = linearize(at_height(self.satellite, height), self.point, self._actuator)
+            ranges = stable_gain_range(controlled(model, self.pid))
+            ends.append(nearest_range(ranges, self.pid.gain))
+        return np.array(ends)
+
     def to_dict(self) -> dict[str, Any]:
-        """For JSON, with the keys of the interface."""
-        coupled = self.coupled
+        """For JSON, with the keys of the interface; see docs/analysis.md."""
+        loops, rules = self.loop_analyses, self.rules
         return json_ready(
             {
                 "scenario": self.scenario.name,
+                "version": version("quietbus"),
+                "notes": self.notes,
                 "gimbal_angle": self.gimbal_angle.tolist(),
-                "channels": self.channels.to_dict() | {"verdict": self.channels.verdict},
-                "loop": self.loop_analyses
-                and {axis: a.to_dict() for axis, a in self.loop_analyses.items()},
-                "rules": self.rules and {axis: rule.to_dict() for axis, rule in self.rules.items()},
-                "coupled": coupled
-                and {
-                    "gain": coupled.gain,
-                    "stable": coupled.stable,
-                    "stable_gain_range": coupled.stable_gain_range,
-                    "gain_margin_db": coupled.gain_margin_db,
-                    "gain_margins_db": coupled.gain_margins_db,
-                    "disk_margin": coupled.disk_margin,
-                    "disk_gain_margin_db": coupled.disk_gain_margin_db,
-                    "disk_phase_margin_deg": coupled.disk_phase_margin_deg,
-                    "poles": [[pole.real, pole.imag] for pole in coupled.poles.tolist()],
+                "channels": self.channels.to_dict(),
+                "channel_coupling": {
+                    "peak_gain": self.channels.coupling,
+                    "verdict": self.channels.verdict,
                 },
-                "truth": self.truth(),
+                "loop": loops and {axis: loop.to_dict() for axis, loop in loops.items()},
+                "rules": rules and {axis: rule.to_dict() for axis, rule in rules.items()},
+                "coupled": self.coupled and self.coupled.to_dict(),
+                "truth": self.truth,
                 "modes": {
                     base: [mode.to_dict() for mode in modes] for base, modes in self.modes.items()
                 },
@@ -218,6 +263,12 @@ def without_leg_mass(satellite: Satellite) -> Satellite:
         for name in ("mass", "transverse_inertia", "axial_inertia")
     ]
     return eqx.tree_at(masses, satellite, [0.0 * value for value in masses(satellite)])
+
+
+def without_rotation(satellite: Satellite) -> Satellite:
+    """The satellite with its rotors at a standstill."""
+    speed = lambda s: s.cluster.rotor_speed  # noqa: E731
+    return eqx.tree_at(speed, satellite, 0.0 * speed(satellite))
 
 
 def without_friction(satellite: Satellite) -> Satellite:

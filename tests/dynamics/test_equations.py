@@ -1,6 +1,7 @@
 """The equations of motion against closed forms, symmetries and Newton's and Euler's laws."""
 
 from dataclasses import replace
+from functools import cache
 
 import equinox as eqx
 import jax
@@ -26,26 +27,29 @@ from quietbus.spatial.rotation import (
 from quietbus.validate.states import random_state, random_wrench
 from quietbus.validate.trajectory import fly, held_gimbals, massless_legs
 
+pytestmark = pytest.mark.xdist_group("equations")  # compiled once, in one process
 quickly = settings(deadline=None, max_examples=10)
 seeds = st.integers(0, 10_000)
 vectors = st.tuples(*[st.floats(-3.0, 3.0)] * 3).map(jnp.array)
 
-T0 = jnp.asarray(0.3)  # [s] time at which equations are compared: rotors in no special position
+T0 = jnp.float64(0.3)  # [s] time at which equations are compared: rotors in no special position
 IDENTITY = jnp.array([1.0, 0.0, 0.0, 0.0])
 MOUNTS = ["isolated", "rigid"]
 
 rate_of = eqx.filter_jit(state_rate)
+at_start = eqx.filter_jit(initial_state)
+awkward = cache(awkward_satellite)
 
 
 def at_rest(satellite):
     """Plate in its nominal pose, everything at the origin and at rest."""
-    return initial_state(satellite, IDENTITY, jnp.zeros(3), jnp.zeros(4))
+    return at_start(satellite, IDENTITY, jnp.zeros(3), jnp.zeros(4))
 
 
 def controlled(mount, seed):
     """A satellite with every term in play, its control aiming anywhere, and a random state."""
     rng = np.random.default_rng(seed)
-    satellite = awkward_satellite(mount, imbalance=100.0)
+    satellite = awkward(mount, imbalance=100.0)
     q_NR = rng.normal(size=4)
     satellite = replace(
         satellite,
@@ -69,6 +73,7 @@ def same_state(found, expected, atol):
 # --- closed forms ------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("h_z", [-300.0, 0.0, 300.0])
 def test_free_axisymmetric_gyrostat_precesses_at_closed_form_rate(h_z):
     """w_x + i w_y turns at ((I_a - I_t) w_z + h_z) / I_t, over ten seconds.
@@ -101,7 +106,7 @@ def test_free_axisymmetric_gyrostat_precesses_at_closed_form_rate(h_z):
     satellite = replace(satellite, bus=bus)
 
     times = jnp.linspace(0.0, 10.0, 6)
-    start = initial_state(satellite, IDENTITY, jnp.asarray(w0), jnp.zeros(4))
+    start = at_start(satellite, IDENTITY, jnp.asarray(w0), jnp.zeros(4))
     w = fly(satellite, start, times).w_NB_B
     turning = ((I_a - I_t) * w0[2] + h_z) / I_t
     expected = (w0[0] + 1j * w0[1]) * np.exp(1j * turning * times)
@@ -110,7 +115,7 @@ def test_free_axisymmetric_gyrostat_precesses_at_closed_form_rate(h_z):
 
 
 def moved(state, x, u):
-    """The state at rest with displacements and turns x, velocities and rates u, of plate and bus."""
+    """The state at rest after displacements and turns x, with velocities and rates u (12 each)."""
     return replace(
         state,
         p_NP_N=state.p_NP_N + x[:3],
@@ -158,7 +163,7 @@ def test_strut_transmits_force_as_the_single_axis_isolator(damping_ratio, peak):
     M, k = 82.8, 6 * 2e4 / 3
     c = 2.0 * damping_ratio * np.sqrt(k * M)
     satellite = massless_legs(paper_satellite(imbalance=0.0))
-    bus = replace(satellite.bus, mass=jnp.asarray(1e10), I_BBcm_B=1e10 * jnp.eye(3))
+    bus = replace(satellite.bus, mass=jnp.float64(1e10), I_BBcm_B=1e10 * jnp.eye(3))
     legs = replace(satellite.legs, damping=jnp.full(6, c / 2.0))
     satellite = replace(satellite, bus=bus, legs=legs)
     by_x, by_u = linearized(_at_rest_under(satellite, Wrench.zero()))
@@ -219,7 +224,7 @@ def test_six_rigid_body_and_six_elastic_modes():
 def test_rotor_imbalance_shakes_a_heavy_bus_by_its_closed_forms(unit, phi):
     """m e Omega^2 outwards along the imbalance, and I_xy Omega^2 across it, on a rigid mount."""
     satellite = replace(paper_satellite("rigid"), loads=body_loads(np.zeros((2, 3, 3))))
-    heavy = replace(satellite.bus, mass=jnp.asarray(1e11), I_BBcm_B=1e11 * jnp.eye(3))
+    heavy = replace(satellite.bus, mass=jnp.float64(1e11), I_BBcm_B=1e11 * jnp.eye(3))
     speed = 200.0 * np.pi * (jnp.arange(4) == unit)
     cluster = replace(satellite.cluster, rotor_speed=speed, rotor_phase=jnp.full(4, phi))
     satellite = replace(satellite, bus=heavy, cluster=cluster)
@@ -417,7 +422,7 @@ def joint_case(seed):
     friction_U = -satellite.legs.spherical_friction[:, None] * joints.w_leg_in_plate_N
     friction_A = -satellite.legs.universal_friction[:, None] * joints.w_leg_in_bus_N
     at_U = forces.spherical_force, np.cross(p_U, forces.spherical_force) + friction_U
-    moment = forces.universal_moment[:, None] * forces.h
+    moment = forces.universal_moment[:, None] * forces.universal_axis
     at_A = forces.universal_force, np.cross(p_A, forces.universal_force) + friction_A + moment
     return satellite, state, wrench, (np.asarray(linear), np.asarray(angular)), at_U, at_A, forces
 
@@ -459,9 +464,9 @@ def test_struts_alone_push_the_upper_parts_along_the_legs(seed):
     along = np.sum(s * (at_U[0] - linear[16:22]), axis=1)
     np.testing.assert_allclose(along, tension, atol=1e-8)
     k = np.asarray(legs.k_B @ quaternion_to_matrix(state.q_NB).T)
-    np.testing.assert_allclose(np.sum(forces.h * k, axis=1), np.zeros(6), atol=1e-12)
-    np.testing.assert_allclose(np.sum(forces.h * np.cross(k, s), axis=1), np.zeros(6), atol=1e-12)
-    np.testing.assert_allclose(np.linalg.norm(forces.h, axis=1), np.ones(6), rtol=1e-12)
+    np.testing.assert_allclose(np.sum(forces.universal_axis * k, axis=1), np.zeros(6), atol=1e-12)
+    np.testing.assert_allclose(np.sum(forces.universal_axis * np.cross(k, s), axis=1), np.zeros(6), atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(forces.universal_axis, axis=1), np.ones(6), rtol=1e-12)
 
 
 def test_massless_legs_carry_their_strut_force_and_nothing_else():
@@ -490,7 +495,7 @@ def _directions(satellite, state):
 
 def test_rigid_mount_holds_the_plate_where_the_bus_has_it():
     """Under loads and strong imbalance, gimbals turning, for half a second."""
-    satellite = awkward_satellite("rigid", imbalance=100.0)
+    satellite = awkward("rigid", imbalance=100.0)
     rng = np.random.default_rng(2)
     state = random_state(satellite, rng)
     satellite = held_gimbals(satellite, random_wrench(satellite, rng))
@@ -498,7 +503,7 @@ def test_rigid_mount_holds_the_plate_where_the_bus_has_it():
     assert np.abs(states.w_NB_B - state.w_NB_B).max() > 1e-3
     for i in range(6):
         now = jax.tree.map(lambda value, i=i: value[i], states)
-        held = initial_state(satellite, now.q_NB, now.w_NB_B, now.gimbal_angle)
+        held = at_start(satellite, now.q_NB, now.w_NB_B, now.gimbal_angle)
         pose = (now.p_NP_N - now.p_NB_N, now.v_NP_N - now.v_NB_N, now.w_NP_P)
         for found, expected in zip(pose, (held.p_NP_N, held.v_NP_N, held.w_NP_P), strict=True):
             np.testing.assert_allclose(found, expected, atol=1e-9)

@@ -169,7 +169,7 @@ def test_relabelling_units_relabels_the_rates(gamma, wish, order):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_commanded_gimbal_rates_give_the_bus_the_torque_of_the_controller(seed):
-    """-dh/dt in the bus frame is the torque, with unlike rotors and a plate that is mounted turned."""
+    """-dh/dt in the bus frame is the torque, with unlike rotors and a plate mounted askew."""
     rng = np.random.default_rng(seed)
     scenario = load_scenario("zhang2012").with_overrides(
         {"control.steering": {"law": "pseudo_inverse"}}

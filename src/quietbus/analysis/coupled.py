@@ -4,21 +4,25 @@ What the paper's per-axis analysis leaves out is in: the free bus, the platform'
 products of inertia, legs with mass, joint friction, rotor momentum, the gimbal servo.
 """
 
+import dataclasses
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq, minimize, minimize_scalar
 
-from quietbus.analysis.loop import PID
+from quietbus.analysis.channels import json_ready
+from quietbus.analysis.loop import PID, between, count_unstable, gain_verdict
 from quietbus.dynamics.linearize import LinearModel
 
-DECADES = 5  # of gain searched on either side of the chosen one
-POINTS_PER_DECADE = 16
+REACH = 1e6  # [-] gains further than this factor from the chosen one are taken for rounding
 
 
 @dataclass(frozen=True)
 class ControlledSatellite:
-    """Loop ``u = -K/Kd (Kp theta + Ki q + Kd w)``, ``dq/dt = theta`` around a linear satellite.
+    """Loop ``u = -(Kp theta + Ki q + Kd w)``, ``dq/dt = theta`` around a linear satellite.
+
+    K scales the whole controller: Kd, or Kp without Kd, as in the analysis per axis.
 
     Only states that something depends on are kept: position, velocity and, at rest, gimbal angles
     are integrals that act on nothing.
@@ -27,7 +31,7 @@ class ControlledSatellite:
     A: np.ndarray  # (n, n) satellite and integral of the error, loop open
     B: np.ndarray  # (n, 3) by control torque [N m]
     F: np.ndarray  # (3, n) feedback at unit gain K
-    gain: float  # [N m s/rad] the chosen K = Kd
+    gain: float  # the chosen K [N m s/rad]
 
     def closed(self, gain: float | np.ndarray) -> np.ndarray:
         """System matrix (..., n, n) of the closed loop at gain K."""
@@ -54,24 +58,24 @@ def controlled(model: LinearModel, pid: PID) -> ControlledSatellite:
 
     Args:
         model: with input ``control_torque`` and outputs ``bus_attitude``, ``bus_rate``.
-        pid: gains [N m/rad, N m/(rad s), N m s/rad]; kd must not be zero.
+        pid: gains, of which at least one is not zero.
 
     Raises:
-        ValueError: kd is zero, so that K = Kd cannot scale the controller.
+        ValueError: all gains are zero, so that there is no loop.
     """
-    if pid.kd == 0.0:
-        raise ValueError("the coupled analysis scales the controller by K = Kd, which is zero")
+    if not pid.gain:
+        raise ValueError("pid: expected a gain that is not zero; without control there is no loop")
     plant = model.select(["control_torque"], ["bus_attitude", "bus_rate"])
     kept = _states_that_matter(plant)
     A, B, C = plant.A[np.ix_(kept, kept)], plant.B[kept], plant.C[:, kept]
-    n, zero = len(A), np.zeros((3, 3))
     attitude, rate = C[:3], C[3:]
-    return ControlledSatellite(
-        A=np.block([[A, np.zeros((n, 3))], [attitude, zero]]),
-        B=np.vstack([B, zero]),
-        F=np.hstack([(pid.kp * attitude + pid.kd * rate) / pid.kd, pid.ki / pid.kd * np.eye(3)]),
-        gain=pid.kd,
-    )
+    F = (pid.kp * attitude + pid.kd * rate) / pid.gain
+    if pid.ki:  # without it the integral acts on nothing
+        n, zero = len(A), np.zeros((3, 3))
+        A = np.block([[A, np.zeros((n, 3))], [attitude, zero]])
+        B = np.vstack([B, zero])
+        F = np.hstack([F, pid.ki / pid.gain * np.eye(3)])
+    return ControlledSatellite(A, B, F, pid.gain)
 
 
 def _states_that_matter(model: LinearModel) -> np.ndarray:
@@ -87,11 +91,13 @@ def _states_that_matter(model: LinearModel) -> np.ndarray:
 
 @dataclass(frozen=True)
 class CoupledAnalysis:
-    """Stability of the coupled loop; K scales the whole controller, K = Kd."""
+    """Stability of the coupled loop; K scales the whole controller."""
 
     gain: float
     stable: bool
-    stable_gain_range: tuple[tuple[float, float | None], ...]  # all found, ascending
+    unstable_poles: int  # closed-loop poles in the right half-plane
+    stable_gain_range: tuple[tuple[float, float | None], ...]  # all there are, ascending
+    critical_gains: tuple[float, ...]  # K at which poles cross the imaginary axis, ascending
     gain_margins_db: tuple[float, ...]  # to the ends of the range that holds the chosen gain
     disk_margin: float  # [-] symmetric multi-loop disk margin alpha, 0 if unstable
     disk_gain_margin_db: float  # every axis at once may change by so much, up or down
@@ -104,11 +110,24 @@ class CoupledAnalysis:
         upward = [margin for margin in self.gain_margins_db if margin > 0.0]
         return min(upward) if upward else None
 
+    @property
+    def verdict(self) -> str:
+        """Whether the loop is stable, and for which gains, in words."""
+        return gain_verdict(self.gain, self.stable, self.unstable_poles, self.stable_gain_range)
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        return json_ready(values | {"gain_margin_db": self.gain_margin_db, "verdict": self.verdict})
+
 
 def analyze_coupled(system: ControlledSatellite) -> CoupledAnalysis:
     """Stable gain range by eigenvalues, margins of all axes together."""
-    ranges = stable_gain_range(system)
-    stable = bool(system.abscissa(system.gain) < 0.0)
+    critical = critical_gains(system)
+    ranges = stable_gain_range(system, critical)
+    poles = system.poles()
+    unstable, marginal = count_unstable(poles)
+    stable = unstable == 0 and not marginal
     here = [(low, high) for low, high in ranges if stable and low < system.gain]
     here = [(low, high) for low, high in here if high is None or system.gain < high]
     ends = [end for low_high in here for end in low_high if end]
@@ -116,34 +135,82 @@ def analyze_coupled(system: ControlledSatellite) -> CoupledAnalysis:
     return CoupledAnalysis(
         gain=system.gain,
         stable=stable,
+        unstable_poles=unstable,
         stable_gain_range=ranges,
+        critical_gains=tuple(critical.tolist()),
         gain_margins_db=tuple(float(20.0 * np.log10(end / system.gain)) for end in ends),
         disk_margin=alpha,
         disk_gain_margin_db=float(20.0 * np.log10((2.0 + alpha) / (2.0 - alpha)))
         if alpha < 2.0
         else float("inf"),
         disk_phase_margin_deg=float(np.degrees(2.0 * np.arctan(alpha / 2.0))),
-        poles=system.poles(),
+        poles=poles,
     )
 
 
-def stable_gain_range(system: ControlledSatellite) -> tuple[tuple[float, float | None], ...]:
-    """Intervals of K with all closed-loop poles in the left half plane.
+def critical_gains(system: ControlledSatellite) -> np.ndarray:
+    """All K > 0 at which closed-loop poles may cross the imaginary axis, ascending.
 
-    Sign changes of the spectral abscissa on a logarithmic grid around the chosen gain, each then
-    solved for to rounding. None stands for no upper end within the search.
+    Poles on the axis are a pair with the sum zero, or one at zero. The sums of two poles of M are
+    the eigenvalues of M's action on antisymmetric matrices, ``X -> M X + X M^T``. That operator is
+    linear in K and, the torque being three numbers, changes by a matrix of rank 3 n at most:
+    ``S(K) = S(K0) - (K - K0) U V`` is singular where 1/(K - K0) is an eigenvalue of
+    ``V S(K0)^-1 U``, which is small. No gain is missed, as it could be on a grid; some found are
+    harmless (real poles of opposite sign).
     """
-    count = 2 * DECADES * POINTS_PER_DECADE + 1
-    gains = abs(system.gain) * np.logspace(-DECADES, DECADES, count)
-    values = system.abscissa(gains)
-    changes = np.flatnonzero((values[:-1] < 0.0) != (values[1:] < 0.0))
-    abscissa = lambda x: float(system.abscissa(np.exp(x)))  # noqa: E731
-    logs = [brentq(abscissa, *np.log(gains[i : i + 2]), xtol=1e-15) for i in changes]
-    ends = np.exp(logs).tolist()
-    if values[0] < 0.0:
-        ends.insert(0, 0.0)
+    start = 0.9 * system.gain  # not the gain itself, which may be critical
+    M, B, F = system.closed(start), system.B, system.F
+    unit = np.eye(len(M))
+    i, j = np.triu_indices(len(M), 1)
+
+    def block(left: np.ndarray, right: np.ndarray, p: np.ndarray, q: np.ndarray) -> np.ndarray:
+        return left[np.ix_(i, p)] * right[np.ix_(j, q)]
+
+    S = block(M, unit, i, j) - block(M, unit, j, i) + block(unit, M, i, j) - block(unit, M, j, i)
+    U = B[i][:, :, None] * unit[j][:, None, :] - B[j][:, :, None] * unit[i][:, None, :]
+    V = F[:, None, i] * unit[:, j] - F[:, None, j] * unit[:, i]
+    U, V = U.reshape(len(i), -1), V.reshape(-1, len(i))
+    try:
+        inverses = np.concatenate(
+            [
+                np.linalg.eigvals(V @ np.linalg.solve(S, U)),
+                np.linalg.eigvals(F @ np.linalg.solve(M, B)),
+            ]
+        )
+    except np.linalg.LinAlgError:  # poles that no gain moves lie on the axis
+        return np.empty(0)
+    gains = start + 1.0 / inverses[np.abs(inverses) > 1.0 / (REACH * start)]
+    real = np.abs(gains.imag) <= 1e-3 * np.abs(gains.real)  # two that coincide may look complex
+    return np.sort(gains.real[real & (gains.real > start / REACH)])
+
+
+def stable_gain_range(
+    system: ControlledSatellite, critical: np.ndarray | None = None
+) -> tuple[tuple[float, float | None], ...]:
+    """All intervals of K > 0 with every pole in the left half-plane; None: no upper end.
+
+    Args:
+        critical: ``critical_gains(system)``, if known already.
+    """
+    critical = critical_gains(system) if critical is None else critical
+    inside = system.gain * between(critical / system.gain)
+    stable = [count_unstable(poles) == (0, False) for poles in map(system.poles, inside)]
+    ends = [0.0] if stable[0] else []
+    for k in np.flatnonzero(np.diff(stable)):
+        ends.append(_limit(system, inside[k], inside[k + 1], critical))
     highs = [*ends[1::2], None] if len(ends) % 2 else ends[1::2]
     return tuple(zip(ends[::2], highs, strict=True))
+
+
+def _limit(system: ControlledSatellite, low: float, high: float, critical: np.ndarray) -> float:
+    """The K between low and high at which stability changes, as good as eigenvalues are."""
+    abscissa = lambda x: float(system.abscissa(np.exp(x)))  # noqa: E731
+    guess = critical[(critical > low) & (critical < high)]
+    for ends in ((guess[0] * (1.0 - 1e-6), guess[0] * (1.0 + 1e-6)), (low, high)):
+        a, b = np.log(ends)
+        if (abscissa(a) < 0.0) != (abscissa(b) < 0.0):
+            return float(np.exp(brentq(abscissa, a, b, xtol=1e-15)))
+    return float(guess[0])  # on either side poles stay on the axis
 
 
 def disk_margin(system: ControlledSatellite) -> float:
@@ -169,7 +236,7 @@ def disk_margin(system: ControlledSatellite) -> float:
             break
         low, high = np.log(omega[[max(i - 1, 0), min(i + 1, len(omega) - 1)]])
         found = minimize_scalar(
-            lambda x: -mu(x), bounds=(low, high), method="bounded", options={"xatol": 1e-7}
+            lambda x: -mu(x), bounds=(low, high), method="bounded", options={"xatol": 1e-5}
         )
         best = max(best, -float(found.fun), mu(float(np.log(omega[i]))))
     return 1.0 / best
@@ -198,8 +265,16 @@ def _mu(M: np.ndarray) -> float:
     """Structured singular value of a 3 x 3 matrix for three complex scalars."""
     M = _balanced(M[None])[0]
 
-    def norm(logs: np.ndarray) -> float:
+    def norm(logs: np.ndarray) -> tuple[float, np.ndarray]:
+        """Largest singular value of D M D^-1, and its slopes by the logarithms of D."""
         d = np.exp(np.append(logs, 0.0))
-        return float(np.linalg.norm(d[:, None] * M / d, 2))
+        left, sizes, right = np.linalg.svd(d[:, None] * M / d)
+        slopes = np.abs(left[:, 0]) ** 2 - np.abs(right[0]) ** 2
+        return float(sizes[0]), sizes[0] * slopes[:2]
 
-    return float(minimize(norm, np.zeros(2), method="Nelder-Mead", options={"xatol": 1e-9}).fun)
+    smooth = minimize(norm, np.zeros(2), jac=True, method="BFGS", options={"gtol": 1e-8})
+    if np.max(np.abs(smooth.jac)) < 1e-7 * smooth.fun:
+        return float(smooth.fun)
+    # two singular values meet at the least one, which then has an edge
+    edge = {"xatol": 1e-9, "fatol": 1e-12}
+    return float(minimize(lambda x: norm(x)[0], smooth.x, method="Nelder-Mead", options=edge).fun)

@@ -281,10 +281,10 @@ def _phase_samples(loop: Loop) -> Array:
     n_even, n_odd = even_odd(loop.numerator)
     d_even, d_odd = even_odd(loop.denominator)
     imaginary = P.polysub(P.polymul(n_odd, d_even), P.polymul(n_even, d_odd))
-    return _between(np.sqrt(positive_roots(imaginary)))  # poles on the axis are roots of it too
+    return between(np.sqrt(positive_roots(imaginary)))  # poles on the axis are roots of it too
 
 
-def _between(marks: Array) -> Array:
+def between(marks: Array) -> Array:
     """Points below, between and above the marks; one point if there are no marks."""
     marks = np.unique(marks)
     if marks.size == 0:
@@ -340,7 +340,7 @@ def _solve(function: Callable[[Any], Any], low: float, high: float) -> float:
 def _crossovers(loop: Loop) -> list[tuple[float, bool]]:
     """Frequencies [rad/s] at which abs(L) passes 1, and whether it falls there."""
     difference = P.polysub(squared_gain(loop.numerator), squared_gain(loop.denominator))
-    omega = _between(np.sqrt(positive_roots(difference)))
+    omega = between(np.sqrt(positive_roots(difference)))
     above = loop.log_gain(omega) > 0
     return [
         (_solve(loop.log_gain, omega[i], omega[i + 1]), bool(above[i]))
@@ -441,7 +441,7 @@ def _count(loop: Loop, crossings: list[_Crossing], scale: float) -> Nyquist | No
     return Nyquist(unstable, half(positive), half(negative), half(n), unstable - n)
 
 
-def _count_unstable(poles: NDArray[np.complex128]) -> tuple[int, bool]:
+def count_unstable(poles: NDArray[np.complex128]) -> tuple[int, bool]:
     """Number of poles in the right half-plane, and whether some lie on the imaginary axis."""
     tolerance = MARGINAL * np.abs(poles) + 1e-14 * np.abs(poles).max(initial=0.0)
     unstable = poles.real > tolerance
@@ -452,7 +452,7 @@ def _is_stable(loop: Loop, crossings: list[_Crossing], scale: float) -> bool:
     if loop.delay:
         counts = _count(loop, crossings, scale)
         return counts is not None and counts.Z == 0
-    return _count_unstable(loop.closed_loop_poles(scale * loop.gain)) == (0, False)
+    return count_unstable(loop.closed_loop_poles(scale * loop.gain)) == (0, False)
 
 
 def _stable_ranges(
@@ -499,7 +499,7 @@ def analyze_loop(loop: Loop) -> LoopAnalysis:
         marginal, consistent = counts is None, True
     else:
         poles = loop.closed_loop_poles()
-        unstable, marginal = _count_unstable(poles)
+        unstable, marginal = count_unstable(poles)
         consistent = marginal if counts is None else unstable == counts.Z
     marginal = marginal or loop.hidden_integrators > 0
     stable = unstable == 0 and not marginal
@@ -529,7 +529,11 @@ def analyze_loop(loop: Loop) -> LoopAnalysis:
         nyquist=counts,
         consistent=consistent,
         closed_loop_poles=tuple(poles.tolist()),
-        verdict=_verdict(loop, ranges, unstable, marginal),
+        verdict=(
+            "Not stable: with rate feedback alone the attitude drifts. Give kp a value."
+            if loop.hidden_integrators
+            else gain_verdict(loop.gain, stable, unstable, ranges)
+        ),
         notes=_notes(loop, crossovers, consistent),
     )
 
@@ -540,7 +544,7 @@ def _wrap_deg(angle: Array) -> Array:
 
 
 def _no_control(loop: Loop) -> LoopAnalysis:
-    unstable, marginal = _count_unstable(loop.poles)
+    unstable, marginal = count_unstable(loop.poles)
     return LoopAnalysis(
         gain=loop.gain,
         stable=unstable == 0 and not marginal,
@@ -557,26 +561,27 @@ def _range_text(ranges: tuple[tuple[float, float | None], ...]) -> str:
     )
 
 
-def _verdict(
-    loop: Loop,
+def gain_verdict(
+    gain: float,
+    stable: bool,
+    unstable_poles: int,
     ranges: tuple[tuple[float, float | None], ...],
-    unstable: int,
-    marginal: bool,
 ) -> str:
-    if loop.hidden_integrators:
-        return "Not stable: with rate feedback alone the attitude drifts. Give kp a value."
+    """Whether a loop is stable at the chosen gain K, and at which others, in words."""
     where = (
         f"Stable for {_range_text(ranges)}."
         if ranges
         else "No gain K makes it stable; the PID's zeros or the isolator must change."
     )
-    if unstable:
-        return f"Unstable at K = {loop.gain:.4g}: {unstable} poles in the right half-plane. {where}"
-    if marginal:
-        return f"On the limit of stability at K = {loop.gain:.4g}. {where}"
-    conditional = nearest_range(ranges, loop.gain)[0] > 0
+    if unstable_poles:
+        return (
+            f"Unstable at K = {gain:.4g}: {unstable_poles} poles in the right half-plane. {where}"
+        )
+    if not stable:
+        return f"On the limit of stability at K = {gain:.4g}. {where}"
+    conditional = nearest_range(ranges, gain)[0] > 0
     kind = " (conditionally: too small a gain is unstable too)" if conditional else ""
-    return f"Stable at K = {loop.gain:.4g}{kind}. {where}"
+    return f"Stable at K = {gain:.4g}{kind}. {where}"
 
 
 def _notes(loop: Loop, crossovers: list[tuple[float, bool]], consistent: bool) -> tuple[str, ...]:

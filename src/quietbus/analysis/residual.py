@@ -11,7 +11,7 @@ RESOLVING = 2.56  # samples per period that a line needs to be seen, the practic
 class Residual:
     """Residual motion over the last part of a run, per axis."""
 
-    window: tuple[float, float]  # [s]
+    window: tuple[float, float]  # [s] that the figures are taken over
     jitter_peak: np.ndarray  # (axis,) largest deviation from the slow motion
     jitter_rms: np.ndarray  # (axis,)
     slow: np.ndarray  # (axis,) largest value of the slow motion
@@ -20,8 +20,9 @@ class Residual:
 def residual(time: np.ndarray, signal: np.ndarray, window: float = 1.0) -> Residual:
     """Split the last ``window`` [s] of a signal in slow motion and jitter.
 
-    The slow motion is the cubic that fits best; jitter is what remains. A cubic over one second
-    follows what an attitude loop does (below 1 Hz) and leaves a line at 10 Hz or more untouched.
+    The slow motion is the cubic that fits best under a Hann weight; jitter is what remains in the
+    middle half of the window, where the fit has no ends to bend at. A cubic over one second follows
+    what an attitude loop does (below 1 Hz) and leaves a line at 10 Hz or more untouched.
 
     Args:
         time: (n,) [s], evenly spaced.
@@ -38,10 +39,13 @@ def residual(time: np.ndarray, signal: np.ndarray, window: float = 1.0) -> Resid
     t, values = time[last], signal[last]
     x = 2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0
     basis = np.polynomial.legendre.legvander(x, 3)
-    slow = basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
-    jitter = values - slow
+    weight = np.cos(0.5 * np.pi * x)[:, None]  # of the amplitude; its square is Hann's window
+    fit = np.linalg.lstsq(weight * basis, weight * values, rcond=None)[0]
+    middle = np.abs(x) <= 0.5
+    slow = basis[middle] @ fit
+    jitter = values[middle] - slow
     return Residual(
-        window=(float(t[0]), float(t[-1])),
+        window=(float(t[middle][0]), float(t[middle][-1])),
         jitter_peak=np.max(np.abs(jitter), axis=0),
         jitter_rms=np.sqrt(np.mean(jitter**2, axis=0)),
         slow=np.max(np.abs(slow), axis=0),

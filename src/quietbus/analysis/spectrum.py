@@ -20,12 +20,12 @@ class Spectrum:
 
 
 def detrended(time: np.ndarray, signal: np.ndarray, degree: int = 3) -> np.ndarray:
-    """A signal less the polynomial over time that fits it best.
+    """A signal less the polynomial over time that fits it best under a Hann weight.
 
     Args:
         time: (n,) [s].
         signal: (n, ...), finite.
-        degree: of the polynomial; the cubic is what ``residual`` takes for slow motion.
+        degree: of the polynomial; the cubic so weighted is what ``residual`` takes for slow motion.
 
     Raises:
         ValueError: too few samples, or values that are not finite.
@@ -34,11 +34,11 @@ def detrended(time: np.ndarray, signal: np.ndarray, degree: int = 3) -> np.ndarr
         raise ValueError(f"taking the trend off needs {2 * (degree + 1)} samples, got {len(time)}")
     if not np.all(np.isfinite(signal)):
         raise ValueError("the signal has values that are not finite")
-    basis = np.polynomial.legendre.legvander(
-        2.0 * (time - time[0]) / (time[-1] - time[0]) - 1.0, degree
-    )
+    x = 2.0 * (time - time[0]) / (time[-1] - time[0]) - 1.0
+    basis = np.polynomial.legendre.legvander(x, degree)
+    weight = np.cos(0.5 * np.pi * x)[:, None]
     columns = signal.reshape(len(time), -1)
-    trend = basis @ np.linalg.lstsq(basis, columns, rcond=None)[0]
+    trend = basis @ np.linalg.lstsq(weight * basis, weight * columns, rcond=None)[0]
     return signal - trend.reshape(signal.shape)
 
 

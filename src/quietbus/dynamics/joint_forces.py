@@ -22,7 +22,7 @@ class JointForces(eqx.Module):
     spherical_force: Float[Array, "leg 3"]  # [N] F_s, plate on upper part
     universal_force: Float[Array, "leg 3"]  # [N] F_u, base on lower part
     universal_moment: Float[Array, " leg"]  # [N m] M_u, base on lower part, about h
-    h: Float[Array, "leg 3"]  # [-] unit axis of M_u, normal to both axes of the joint
+    universal_axis: Float[Array, "leg 3"]  # [-] h, normal to both axes of the universal joint
 
 
 def joint_forces(satellite: Satellite, state: State, acceleration: Accelerations) -> JointForces:

@@ -191,10 +191,15 @@ def linearize(
     points = {name: jnp.asarray(p, dtype=float) for name, p in (points or {}).items()}
     rigid = satellite.mount == "rigid"
     at = OperatingPoint(*(jnp.asarray(value, dtype=float) for value in point))
-    (A, B, C, D), drift = _at_equilibrium(satellite, at, actuator, points)
-    _check_equilibrium(drift)
+    A, B, C, D = _at_equilibrium(satellite, at, points)
     n_cmg, n_leg = len(satellite.cluster.rotor_mass), len(satellite.legs.stiffness)
     states, inputs, outputs = _names(n_cmg, n_leg, tuple(points))
+    torque, command = slice(-3 - n_cmg, -n_cmg), slice(-n_cmg, None)
+    if actuator == "servo":
+        steering = _steering(satellite, at)
+        B[:, torque], D[:, torque] = B[:, command] @ steering, D[:, command] @ steering
+    else:
+        B[:, command] = D[:, command] = 0.0
     if rigid:
         kept = [i for i, name in enumerate(states) if not name.startswith("plate_")]
         A, B, C = A[np.ix_(kept, kept)], B[kept], C[:, kept]
@@ -261,12 +266,11 @@ def _rates_and_outputs(
     satellite: Satellite,
     moments: ClusterMoments,
     at: OperatingPoint,
-    actuator: Actuator,
     points: Mapping[str, Float[Array, "3"]],
     x: Float[Array, " x"],
     u: Float[Array, " u"],
 ) -> tuple[Float[Array, " x"], Float[Array, " y"]]:
-    """dx/dt and the outputs, nonlinear."""
+    """dx/dt and the outputs, nonlinear; ``control_torque`` acts on the plate as it is."""
     state, rate = _chart(satellite, at, x), at.rate
     n = len(satellite.cluster.rotor_mass)
     cuts = np.cumsum([3, 3, 3, 3, 6 * n, 3])
@@ -281,19 +285,12 @@ def _rates_and_outputs(
             plate_torque
             + jnp.sum(cmg_torque, axis=0)
             + jnp.sum(jnp.cross(_rotor_centres_P(satellite, state.gimbal_angle), cmg_force), axis=0)
-        ),
+        )
+        + torque,
         force_B=R_B @ bus_force,
         torque_B=R_B @ bus_torque,
     )
-    if actuator == "ideal":
-        wrench = eqx.tree_at(lambda w: w.torque_P, wrench, wrench.torque_P + torque)
-        gimbal_acceleration = jnp.zeros(n)
-    else:
-        axes, h_rms = torque_axes(satellite, at.gimbal_angle)
-        law = satellite.steering or PseudoInverse()
-        wanted = -quaternion_to_matrix(satellite.q_BP).T @ torque / h_rms
-        command = command + law.rates(axes, wanted, jnp.zeros(()))
-        gimbal_acceleration = satellite.servo.bandwidth * (command - state.gimbal_rate)
+    gimbal_acceleration = satellite.servo.bandwidth * (command - state.gimbal_rate)
     phi = jnp.zeros(n)  # of no effect: the moments are averaged over it
     a = accelerations(satellite, state, phi, gimbal_acceleration, wrench, moments)
 
@@ -351,19 +348,22 @@ def _rotor_centres_P(satellite, gimbal_angle):
     return cluster.p_PC_P + jnp.einsum("jab,jb->ja", R_PG, cluster.p_CR_G)
 
 
-def _at_equilibrium(satellite, at, actuator, points):
-    """A, B, C, D where the plate is in equilibrium, and the bus's angular acceleration there.
+def _at_equilibrium(satellite, at, points):
+    """A, B, C, D where the plate is in equilibrium.
 
     Newton's method on the plate's pose: struts may be preloaded, or in the field of a steady turn.
     """
     x = np.zeros(24 + 2 * len(satellite.cluster.rotor_mass))
     for _ in range(NEWTON_STEPS):
-        matrices, rates = jax.device_get(_jacobians(satellite, at, actuator, points, x))
+        matrices, rates = jax.device_get(_jacobians(satellite, at, points, x))
         unbalance = _plate_against_bus(rates)
-        if satellite.mount == "rigid" or np.all(np.abs(unbalance) < 1e-11):
+        if satellite.mount == "rigid":
+            unbalance[:] = 0.0
+        if np.all(np.abs(unbalance) < 1e-11):
             break
         x[3:9] -= np.linalg.solve(_plate_against_bus(matrices[0])[:, 3:9], unbalance)
-    return matrices, rates[9:12]
+    _check_equilibrium(rates[9:12], unbalance)
+    return tuple(np.array(matrix) for matrix in matrices)
 
 
 NEWTON_STEPS = 20
@@ -375,13 +375,13 @@ def _plate_against_bus(rows):
 
 
 @eqx.filter_jit
-def _jacobians(satellite, at, actuator, points, x):
+def _jacobians(satellite, at, points, x):
     """A, B, C, D and dx/dt at deviation x."""
     n = len(satellite.cluster.rotor_mass)
     moments = ClusterMoments.expand(satellite.cluster).averaged()
 
     def system(x, u):
-        rates, outputs = _rates_and_outputs(satellite, moments, at, actuator, points, x, u)
+        rates, outputs = _rates_and_outputs(satellite, moments, at, points, x, u)
         return (rates, outputs), rates
 
     u = jnp.zeros(15 + 7 * n)
@@ -389,11 +389,40 @@ def _jacobians(satellite, at, actuator, points, x):
     return (A, B, C, D), rates
 
 
-def _check_equilibrium(acceleration: np.ndarray) -> None:
-    if not np.all(np.abs(acceleration) < 1e-8):
-        listed = ", ".join(f"{value:.3g}" for value in acceleration)
+def _steering(satellite: Satellite, at: OperatingPoint) -> np.ndarray:
+    """Gimbal rate commands (cmg, 3) by control torque, bus axes."""
+    commands = np.asarray(_steering_matrix(satellite, at.gimbal_angle))
+    if not np.all(np.isfinite(commands)):
+        raise ValueError(
+            "the cluster is singular at these gimbal angles, or its rotors stand still: steering "
+            "gives no finite gimbal rates. Expected other gimbal angles, a robust steering law, "
+            'or actuator="ideal"'
+        )
+    return commands
+
+
+@eqx.filter_jit
+def _steering_matrix(satellite, gimbal_angle):
+    axes, h_rms = torque_axes(satellite, gimbal_angle)
+    law = satellite.steering or PseudoInverse()
+    wanted = -quaternion_to_matrix(satellite.q_BP) / h_rms  # a row for each axis of the torque
+    return jax.vmap(lambda w: law.rates(axes, w, jnp.zeros(())))(wanted).T
+
+
+def _check_equilibrium(bus: np.ndarray, plate: np.ndarray) -> None:
+    if not np.all(np.abs(bus) < 1e-8):
         raise ValueError(
             "the operating point is not an equilibrium: the bus would accelerate with "
-            f"[{listed}] rad/s^2. Expected a steady rate of zero, or one about which the total "
+            f"{_listed(bus)} rad/s^2. Expected a steady rate of zero, or one about which the total "
             "angular momentum (rotors included) does not turn"
         )
+    if not np.all(np.abs(plate) < 1e-8):
+        raise ValueError(
+            "the operating point is not an equilibrium: no pose of the plate was found in which "
+            f"the struts hold it; it would accelerate with {_listed(plate)} m/s^2, rad/s^2. "
+            "Expected struts whose free lengths fit the geometry, or a slower rate"
+        )
+
+
+def _listed(values: np.ndarray) -> str:
+    return "[" + ", ".join(f"{value:.3g}" for value in values) + "]"

@@ -44,8 +44,8 @@ class SingularityRobust(Steering):
     """``A^T (A A^T + lambda E)^-1`` with ``lambda = lambda0 exp(-mu det(A A^T))``.
 
     Nakamura and Hanafusa's robust pseudo-inverse in Wie's form: rates stay bounded at a singular
-    set, at the cost of a torque error of relative size lambda everywhere else. Defaults in the
-    scenario: lambda0 = 0.01, mu = 10.
+    set, at the cost of a torque error elsewhere: lambda / (sigma^2 + lambda) of the part along a
+    direction whose singular value in A is sigma. Defaults: lambda0 = 0.01, mu = 10.
     """
 
     lambda0: Float[Array, ""]  # [-]
@@ -60,8 +60,8 @@ class SingularityRobust(Steering):
 class GeneralizedSingularityRobust(Steering):
     """Wie's generalised SR inverse: the added matrix has moving off-diagonal terms.
 
-    ``A^T (A A^T + lambda E)^-1`` with E_ii = 1 and E_12, E_13, E_23 equal to
-    ``epsilon0 sin(omega t + phase)``: a torque along the singular direction then still moves the
+    ``A^T (A A^T + lambda E)^-1`` with E_ii = 1 and E_23, E_13, E_12 equal to
+    ``epsilon0 sin(omega t + phases)``: a torque along the singular direction then still moves the
     gimbals, so the cluster leaves a singular set instead of staying in it (Wie, Bailey, Heiberg
     2001).
     """

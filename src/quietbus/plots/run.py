@@ -108,7 +108,7 @@ def gimbals(run: xr.Dataset) -> Figure:
 
 def struts(run: xr.Dataset) -> Figure:
     """Strokes and forces of the struts."""
-    return _two_rows(
+    figure = _two_rows(
         run,
         heading(run, "Struts of the isolation platform"),
         [
@@ -117,6 +117,9 @@ def struts(run: xr.Dataset) -> Figure:
         ],
         "leg",
     )
+    if figure.axes[1].collections:
+        figure.axes[1].set_title("bands: vibration, peak to peak")
+    return figure
 
 
 def spectrum(run: xr.Dataset) -> Figure:
@@ -215,8 +218,6 @@ def _two_rows(run: xr.Dataset, title: str, rows: list[tuple[np.ndarray, str]], w
         names = [f"{what} {number}" for number in range(values.shape[1])]
         draw_lines(axes, run["time"].to_numpy(), values, names)
         axes.set_ylabel(label)
-    if panels[0].collections:
-        panels[0].set_title("bands: vibration, peak to peak")
     panels[-1].set_xlabel(TIME)
     share_legend(figure, panels[0])
     return figure

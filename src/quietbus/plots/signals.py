@@ -7,6 +7,7 @@ import xarray as xr
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
+from quietbus.analysis.residual import residual
 from quietbus.analysis.spectrum import Spectrum, amplitude_spectrum, detrended
 from quietbus.results import aliasing, scenario_of
 
@@ -60,7 +61,7 @@ class Jitter:
     start: float  # [s]
     time: np.ndarray  # (n,) [ms] after the start
     rate: np.ndarray  # (n, 3) [deg/s]
-    peak: np.ndarray  # (3,) [deg/s] over the last second
+    peak: np.ndarray  # (3,) [deg/s] as in the run's summary
 
 
 def jitter(run: xr.Dataset) -> Jitter:
@@ -73,17 +74,19 @@ def jitter(run: xr.Dataset) -> Jitter:
     if warning:
         raise ValueError(warning.partition(". ")[0])
     time = run["time"].to_numpy()
+    rates = degrees(run, "bus_rate")
+    rest = residual(time, rates, TREND)
     last = time >= time[-1] - TREND
-    t = time[last]
-    rate = detrended(t, degrees(run, "bus_rate")[last])
+    rate = make_interp_spline(time[last], detrended(time[last], rates[last]), k=3)
     slowest, _ = rotor_frequencies(run)
-    start = max(t[0], t[-1] - (10.0 / slowest if slowest else 0.1))
-    fine = np.linspace(start, t[-1], 1000)
+    first, end = rest.window
+    start = max(first, end - (10.0 / slowest if slowest else 0.1))
+    fine = np.linspace(start, end, 1000)
     return Jitter(
         start=start,
         time=1e3 * (fine - start),
-        rate=make_interp_spline(t, rate, k=3)(fine),
-        peak=np.max(np.abs(rate), axis=0),
+        rate=rate(fine),
+        peak=rest.jitter_peak,
     )
 
 

@@ -70,7 +70,8 @@ def integrate(
     tolerances = tolerances or Tolerances()
     count = int(np.floor(duration * output_rate * (1.0 + 1e-12))) + 1
     time = np.arange(count) / output_rate
-    size = int(np.ceil(PIECE * output_rate)) + 1
+    # a power of two, so that output rates share compiled programs
+    size = max(64, 1 << int(np.ceil(PIECE * output_rate)).bit_length())
     store: list[np.ndarray] = []
     state, t, done = initial, 0.0, 0
     steps = rejected = 0
@@ -139,7 +140,7 @@ def _compiled_piece(satellite, state, numbers, with_joint_forces) -> _Piece:
     def left_geometry(t, y, args, **kwargs):  # noqa: ARG001
         return geometry_margin(satellite, unravel(y)) <= 0.0
 
-    controller = diffrax.PIDController(rtol=rtol, atol=atol, dtmin=1e-9)
+    controller = diffrax.PIDController(rtol=rtol, atol=atol, dtmin=1e-9, force_dtmin=False)
     corners = [load.profile.corners for load in satellite.loads]
     if sum(len(corner) for corner in corners):
         jumps = jnp.sort(jnp.concatenate(corners))

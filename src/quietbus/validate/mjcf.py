@@ -255,14 +255,11 @@ def _cluster(plate: ET.Element, satellite: Satellite) -> None:
 
 
 def _bus_and_plate_shapes(bus: ET.Element, plate: ET.Element, satellite: Satellite) -> None:
-    """A box below the base plate, and a disk that holds the legs' upper joints."""
-    joints, offset = np.asarray(satellite.legs.p_BA_B), np.asarray(satellite.p_BP_B)
-    half = 0.5 * float(np.mean(joints @ offset) / max(np.linalg.norm(offset), 1e-3))
-    half = max(abs(half), 0.1)
-    side = max(float(np.abs(joints).max()), half)
-    _shape(bus, "bus", "box", pos="0 0 0", size=f"{side} {side} {half}")
-    radius = float(np.linalg.norm(np.asarray(satellite.legs.p_PU_P), axis=1).max())
-    _shape(plate, "plate", "cylinder", pos="0 0 0", size=f"{max(radius, 0.05)} 0.01")
+    """A box with the universal joints on its faces, and a disk under the spherical joints."""
+    half = np.maximum(np.abs(np.asarray(satellite.legs.p_BA_B)).max(axis=0), 0.1)
+    _shape(bus, "bus", "box", size=_text(half))
+    radius = np.linalg.norm(np.asarray(satellite.legs.p_PU_P), axis=1).max()
+    _shape(plate, "plate", "cylinder", size=_text([radius, 0.01]))
 
 
 def _free_body(world: ET.Element, name: str, p_NX_N: object, q_NX: object) -> ET.Element:

@@ -1,0 +1,135 @@
+"""The command line: what it writes, what it prints, how it ends."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+import quietbus as qb
+from quietbus import cli
+
+
+@pytest.fixture
+def command(monkeypatch, tmp_path, capsys):
+    """Run a command in an empty folder; gives exit status, standard output and error."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["quietbus", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        out, err = capsys.readouterr()
+        return ended.value.code or 0, out, err
+
+    return call
+
+
+def short(tmp_path, **changes):
+    text = qb.load_scenario("zhang2012").with_overrides({"simulation.duration": 1.2}).to_yaml()
+    for old, new in changes.items():
+        assert old in text
+        text = text.replace(old, new, 1)
+    path = tmp_path / "my.yaml"
+    path.write_text(text)
+    return str(path)
+
+
+def test_simulate_writes_the_run_and_prints_its_numbers(command, tmp_path):
+    status, out, _ = command("simulate", short(tmp_path), "-o", "run.nc", "--mount", "rigid")
+    assert status == 0
+    run = qb.load_run(tmp_path / "run.nc")
+    assert run.attrs["mount"] == "rigid"
+    assert run.time[-1] == pytest.approx(1.2)
+    for text in ("rate jitter x, peak", "deg/s", "peak gimbal rate", "least singularity measure"):
+        assert text in out
+
+
+def test_compare_puts_both_mounts_side_by_side_with_pictures(command, tmp_path):
+    status, out, _ = command("compare", short(tmp_path), "-o", "both")
+    assert status == 0
+    assert "isolated / rigid" in out
+    assert "%" in out
+    made = {path.name for path in (tmp_path / "both").iterdir()}
+    assert {"isolated.nc", "rigid.nc", "summary.json", "rates.png"} <= made
+    summary = json.loads((tmp_path / "both" / "summary.json").read_text())
+    for mount in ("isolated", "rigid"):
+        expected = qb.summarize(qb.load_run(tmp_path / "both" / f"{mount}.nc")).to_dict()
+        assert summary[mount] == expected
+
+
+def test_plot_draws_a_run(command, tmp_path):
+    qb.save_run(qb.simulate("zhang2012", duration=0.3), tmp_path / "run.nc")
+    status, out, _ = command("plot", "run.nc", "--format", "svg")
+    assert status == 0
+    assert len(list((tmp_path / "run").glob("*.svg"))) == out.count("wrote") >= 4
+
+
+def test_init_writes_a_scenario_that_works_and_keeps_what_is_there(command, tmp_path):
+    assert command("init", "new.yaml")[0] == 0
+    assert qb.load_scenario(tmp_path / "new.yaml").name == "my-satellite"
+    (tmp_path / "new.yaml").write_text("mine")
+    status, _, err = command("init", "new.yaml")
+    assert status == 2
+    assert "new.yaml: exists already" in err
+    assert (tmp_path / "new.yaml").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["simulate", "zhang2013"], "did you mean zhang2012"),
+        (["simulate", "zhang2012", "--duration", "ten"], "simulation.duration"),
+        (["simulate", "zhang2012", "--duration", "-3"], "simulation.duration"),
+        (["simulate", "zhang2012", "--duration", "5 m"], "simulation.duration"),
+        (["simulate", "zhang2012", "-o", "no/folder/run.nc"], "no/folder: no such folder"),
+        (["simulate", "zhang2012", "--mount", "soft"], "soft"),
+        (["simulate", "zhang2012", "--mount", "rigid", "--joint-forces"], "--joint-forces"),
+        (["plot", "nothing.nc"], "nothing.nc: no such file"),
+        (["plot", "nothing.nc", "--format", "bmp"], "expected png, svg or pdf, got 'bmp'"),
+        (["validate", "zhang2012", "--export", "no/folder/m.xml"], "no/folder: no such folder"),
+    ],
+)
+def test_bad_input_ends_with_status_2_and_one_message(command, arguments, message):
+    status, out, err = command(*arguments)
+    assert status == 2
+    assert message in err
+    assert out == ""
+    assert "Traceback" not in err
+
+
+def test_bad_scenario_names_file_line_field_and_what_was_expected(command, tmp_path):
+    path = short(tmp_path, **{"damping: 500.0": "damping: 500 N/m"})
+    status, _, err = command("simulate", path)
+    lines = (tmp_path / "my.yaml").read_text().splitlines()
+    line = next(i for i, text in enumerate(lines, 1) if "500 N/m" in text)
+    assert status == 2
+    assert "my.yaml" in err
+    assert str(line) in err
+    assert "isolator.legs.damping" in err
+    assert "N*s/m" in err
+
+
+def test_run_that_diverges_keeps_what_it_has_and_ends_with_status_1(command, tmp_path):
+    path = short(tmp_path, **{"kp: 200.0": "kp: 2.0e+5", "kd: 2500.0": "kd: 2.5e+6"})
+    status, _, err = command("simulate", path, "--duration", "30 s", "-o", "run.nc")
+    assert status == 1
+    assert "at t = " in err
+    assert qb.load_run(tmp_path / "run.nc").attrs["status"] == "stopped"
+
+
+def test_coarse_output_is_told(command, tmp_path):
+    path = short(tmp_path, **{"output_rate: 1000.0": "output_rate: 50"})
+    status, out, err = command("simulate", path)
+    assert status == 0
+    assert "note: the output rate of 50 Hz cannot show" in err
+    assert "n/a" in out
+
+
+def test_help_and_import_do_not_load_heavy_modules():
+    """What makes `quietbus --help` answer at once."""
+    code = "import sys, quietbus, quietbus.cli; print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert not {"jax", "xarray", "matplotlib", "scipy", "pydantic", "numpy"} & set(loaded)
