@@ -11,7 +11,7 @@ demo: $(VENV)/installed
 	$(BIN)/quietbus compare zhang2012 --duration "60 s" --output out
 
 test: lint
-	$(BIN)/pytest -n 2 --dist loadgroup
+	$(BIN)/pytest -n 2 --dist loadfile
 
 lint: $(VENV)/developed
 	$(BIN)/ruff check

@@ -172,8 +172,8 @@ def summarize(run: xr.Dataset) -> Summary:
     peak = lambda name: float(np.max(np.abs(run[name].to_numpy())))  # noqa: E731
     error = np.linalg.norm(run["attitude_error"].to_numpy(), axis=1)
     jitter = rms = slow = None
-    note = aliasing(scenario_of(run))
-    if not note:
+    note = "not shown: the output rate is too low for the rotors"
+    if not aliasing(scenario_of(run)):
         try:
             rest = residual(time, run["bus_rate"].to_numpy())
             jitter, rms, slow = rest.jitter_peak, rest.jitter_rms, rest.slow

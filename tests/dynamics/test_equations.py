@@ -27,7 +27,6 @@ from quietbus.spatial.rotation import (
 from quietbus.validate.states import random_state, random_wrench
 from quietbus.validate.trajectory import fly, held_gimbals, massless_legs
 
-pytestmark = pytest.mark.xdist_group("equations")  # compiled once, in one process
 quickly = settings(deadline=None, max_examples=10)
 seeds = st.integers(0, 10_000)
 vectors = st.tuples(*[st.floats(-3.0, 3.0)] * 3).map(jnp.array)
@@ -465,8 +464,12 @@ def test_struts_alone_push_the_upper_parts_along_the_legs(seed):
     np.testing.assert_allclose(along, tension, atol=1e-8)
     k = np.asarray(legs.k_B @ quaternion_to_matrix(state.q_NB).T)
     np.testing.assert_allclose(np.sum(forces.universal_axis * k, axis=1), np.zeros(6), atol=1e-12)
-    np.testing.assert_allclose(np.sum(forces.universal_axis * np.cross(k, s), axis=1), np.zeros(6), atol=1e-12)
-    np.testing.assert_allclose(np.linalg.norm(forces.universal_axis, axis=1), np.ones(6), rtol=1e-12)
+    np.testing.assert_allclose(
+        np.sum(forces.universal_axis * np.cross(k, s), axis=1), np.zeros(6), atol=1e-12
+    )
+    np.testing.assert_allclose(
+        np.linalg.norm(forces.universal_axis, axis=1), np.ones(6), rtol=1e-12
+    )
 
 
 def test_massless_legs_carry_their_strut_force_and_nothing_else():

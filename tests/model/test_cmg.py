@@ -129,6 +129,20 @@ def test_expansion_is_the_sum_over_units_and_its_time_derivative(seed):
     close(found.p, rates.c)  # momentum is the rate of the first moment
 
 
+def test_averaged_moments_are_the_mean_over_the_rotor_angles():
+    """Five equally spaced angles average a trigonometric polynomial of degree two exactly."""
+    cluster = random_cluster()
+    gamma, rate, acceleration = np.random.default_rng(1).normal(size=(3, 3))
+    moments = eqx.filter_jit(ClusterMoments.expand)(cluster)
+    turns = 2.0 * np.pi / 5.0 * np.stack(np.meshgrid(*[np.arange(5)] * 3), axis=-1).reshape(-1, 3)
+    at = jax.jit(jax.vmap(lambda phi: moments.at(gamma, phi, rate, acceleration)))(turns)
+    averaged = moments.averaged().at(gamma, turns[7], rate, acceleration)
+    for name in ("c", "J", "p", "H", "J_rate", "p_rate", "H_rate"):
+        values = np.asarray(getattr(at, name))
+        error = np.abs(getattr(averaged, name) - values.mean(axis=0)).max()
+        assert error <= 1e-13 * np.abs(values).max(), name
+
+
 def close(found, expected, relative=1e-12):
     scale = np.abs(expected).max()
     np.testing.assert_allclose(found, expected, rtol=0, atol=relative * scale)

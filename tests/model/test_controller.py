@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from quietbus.build import build_initial_state, build_satellite
 from quietbus.dynamics.closed_loop import control_signals
@@ -62,6 +63,31 @@ def test_torque_brakes_the_rate_in_the_bus_frame(signals_of):
     on_target = rotation_vector_to_quaternion(turn)
     torque = signals_of(turn, rate, target=on_target).torque_B
     np.testing.assert_allclose(torque, -2500.0 * rate, atol=1e-10)
+
+
+def test_torque_follows_a_slew_in_the_bus_frame():
+    """Rate error and feedforward, with a bus far off the turning reference."""
+    scenario = load_scenario("zhang2012-slew").with_overrides({"control.torque_limit": None})
+    satellite = build_satellite(scenario)
+    state = build_initial_state(scenario, satellite)
+    J = np.array([[900.0, 20.0, -10.0], [20.0, 1000.0, 30.0], [-10.0, 30.0, 1100.0]])
+    satellite = eqx.tree_at(lambda s: s.controller.J_feedforward_B, satellite, jnp.asarray(J))
+    t = jnp.float64(satellite.guidance.start[0] + 0.5 * satellite.guidance.duration[0])
+    reference = satellite.guidance.reference(t)
+    assert np.linalg.norm(reference.w_NR_R) > 1e-6
+    assert np.linalg.norm(reference.dw_NR_R) > 1e-6
+
+    turn, w = Rotation.from_rotvec([0.7, -0.4, 1.1]), np.array([0.01, 0.03, -0.02])
+    R_NB = Rotation.from_quat(np.roll(reference.q_NR, -1)) * turn
+    q_NB = jnp.asarray(np.roll(R_NB.as_quat(), 1))
+    state = eqx.tree_at(lambda s: (s.q_NB, s.w_NB_B), state, (q_NB, jnp.asarray(w)))
+    found = eqx.filter_jit(control_signals)(satellite, t, state).torque_B
+
+    kp, kd = float(satellite.controller.kp), float(satellite.controller.kd)
+    e = 2.0 * turn.as_quat()[:3]
+    in_B = turn.inv().apply(np.stack([reference.w_NR_R, reference.dw_NR_R]))
+    expected = J @ in_B[1] - kp * e - kd * (w - in_B[0])
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
 def test_torque_limit_keeps_the_direction():

@@ -32,6 +32,18 @@ def test_solver_is_as_exact_as_the_conditioning_allows(n, condition):
     np.testing.assert_allclose(M @ found, M @ x, atol=1e-13 * condition)
 
 
+def test_derivative_of_the_solution_is_that_of_the_inverse():
+    """x' = M^-1 (f' - M' x), by NumPy and by central differences."""
+    rng = np.random.default_rng(5)
+    root, dM, f, df = (rng.normal(size=shape) for shape in ((6, 6), (6, 6), 6, 6))
+    M, dM = root @ root.T + np.eye(6), dM + dM.T
+    x, dx = jax.jit(lambda *at: jax.jvp(solve_positive_definite, at[:2], at[2:]))(M, f, dM, df)
+    np.testing.assert_allclose(dx, np.linalg.solve(M, df - dM @ x), rtol=1e-10)
+    h = 1e-5
+    ahead, behind = (np.linalg.solve(M + d * dM, f + d * df) for d in (h, -h))
+    np.testing.assert_allclose(dx, (ahead - behind) / (2 * h), rtol=1e-6)
+
+
 def test_point_inertia_gives_the_momentum_of_a_point_on_a_circle():
     """I w = r x (m w x r)."""
     r, w = np.random.default_rng(2).normal(size=(2, 3))
