@@ -122,9 +122,9 @@ class ClusterMoments(eqx.Module):
 
     mass: Float[Array, ""]  # [kg] of the cluster
     rotor_speed: Float[Array, " cmg"]  # [rad/s]
-    c_H: Float[Array, "cmg 3 3 6"]  # c and H of the spin, by gimbal and rotor basis of degree 1
-    J: Float[Array, "cmg 5 5 6"]  # xx, yy, zz, xy, xz, yz
-    H_gimbal: Float[Array, "cmg 3 5 3"]  # [kg m^2] H per gimbal rate
+    c_H: Float[Array, "6 cmg 3 3"]  # c and H of the spin, by gimbal and rotor basis of degree 1
+    J: Float[Array, "6 cmg 5 5"]  # xx, yy, zz, xy, xz, yz
+    H_gimbal: Float[Array, "3 cmg 3 5"]  # [kg m^2] H per gimbal rate
 
     @classmethod
     def expand(cls, cluster: ControlMomentGyro) -> "ClusterMoments":
@@ -141,11 +141,12 @@ class ClusterMoments(eqx.Module):
             return fit(jnp.concatenate([c, H], axis=2))[:3, :3], fit(J), fit(H_gimbal)[:3]
 
         mass = jnp.sum(cluster.gimbal_mass + cluster.rotor_mass)
-        return cls(mass, cluster.rotor_speed, *eqx.filter_vmap(unit)(cluster))
+        moments = (jnp.moveaxis(m, -1, 0) for m in eqx.filter_vmap(unit)(cluster))
+        return cls(mass, cluster.rotor_speed, *moments)
 
     def averaged(self) -> "ClusterMoments":
         """The moments averaged over the rotor angles: the imbalance's rotating part is gone."""
-        constant = lambda coefficients: coefficients.at[:, :, 1:].set(0.0)  # noqa: E731
+        constant = lambda coefficients: coefficients.at[..., 1:].set(0.0)  # noqa: E731
         return ClusterMoments(
             self.mass,
             self.rotor_speed,
@@ -214,8 +215,11 @@ _FROM_SAMPLES = np.linalg.inv(
 
 
 def _contract(row, coefficients):
-    """Sum of a row (cmg x basis x basis) against coefficients, over units and bases."""
-    return row.reshape(-1) @ coefficients.reshape(-1, coefficients.shape[-1])
+    """Sum of a row (cmg x basis x basis) against coefficients, over units and bases.
+
+    The moments come first in ``coefficients``, so that each is a dot product along memory.
+    """
+    return coefficients.reshape(len(coefficients), -1) @ row.reshape(-1)
 
 
 def momentum_P(cluster: ControlMomentGyro, gamma: Float[Array, " cmg"]) -> Float[Array, "cmg 3"]:
