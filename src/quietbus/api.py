@@ -4,15 +4,20 @@ import concurrent.futures
 import threading
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Literal
 
+import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
 
 from quietbus.build import build_initial_state, build_satellite
+from quietbus.dynamics.linearize import Actuator, LinearModel, OperatingPoint
+from quietbus.dynamics.linearize import linearize as linearize_satellite
 from quietbus.results import aliasing, to_dataset
 from quietbus.scenario import Scenario, load_scenario
 from quietbus.solve.direct import Tolerances, integrate
+from quietbus.study import Study
 
 Mount = Literal["isolated", "rigid"]
 METHODS = ("direct",)
@@ -77,7 +82,7 @@ def compare(
     *,
     duration: float | None = None,
     progress: Callable[[Mount, float], None] | None = None,
-) -> dict[Mount, xr.Dataset]:
+) -> dict[str, xr.Dataset]:
     """The same scenario on both mounts, side by side on two cores.
 
     Runs that could not be finished are returned as far as they came; their ``status`` tells.
@@ -108,6 +113,77 @@ def compare(
         except KeyboardInterrupt:
             stop.set()
         return {mount: future.result() for mount, future in futures.items()}
+
+
+def analyze(scenario: Scenario | str, gimbal_angle: ArrayLike | None = None) -> Study:
+    """Linear analysis: channels, loops per axis and coupled, modes, transmissibility.
+
+    Args:
+        scenario: a scenario, the path of a scenario file, or a built-in's name.
+        gimbal_angle: (cmg,) [rad] at which to analyse, instead of the scenario's own.
+
+    Returns:
+        The study; its parts are computed when asked for, ``to_dict()`` gives them all
+        (docs/analysis.md).
+
+    Raises:
+        ScenarioError: the scenario is not valid.
+        ValueError: a wrong number of gimbal angles, or ones for which there is no analysis.
+    """
+    scenario = _as_run(scenario, None, None)
+    return Study(scenario, _gimbal_angles(scenario, gimbal_angle))
+
+
+def linearize(
+    scenario: Scenario | str,
+    rate: ArrayLike | None = None,
+    gimbal_angles: ArrayLike | None = None,
+    mount: Mount | None = None,
+    actuator: Actuator = "servo",
+    points: Mapping[str, ArrayLike] | None = None,
+) -> LinearModel:
+    """The uncontrolled satellite, linearised exactly; ``.to_control()`` makes a StateSpace of it.
+
+    Inputs and outputs have names (``docs/analysis.md`` lists them).
+
+    Args:
+        scenario: a scenario, the path of a scenario file, or a built-in's name.
+        rate: (3,) steady rate [rad/s], bus frame, about which to linearise; at rest by default.
+        gimbal_angles: (cmg,) [rad] instead of the scenario's own.
+        mount: "isolated" or "rigid", instead of the scenario's own.
+        actuator: "servo": ``control_torque`` turns the gimbals, by the steering law and the servo.
+            "ideal": it acts on the plate as it is, gimbals held.
+        points: further points of the bus [m], bus frame, by name: their accelerations are outputs.
+
+    Raises:
+        ScenarioError: the scenario is not valid.
+        ValueError: a value of the wrong kind or shape, or a point that is not an equilibrium.
+    """
+    scenario = _as_run(scenario, mount, None)
+    if actuator not in ("servo", "ideal"):
+        raise ValueError(f"actuator must be 'servo' or 'ideal', got {actuator!r}")
+    return linearize_satellite(
+        build_satellite(scenario),
+        OperatingPoint(
+            _vector("rate", np.zeros(3) if rate is None else rate, 3),
+            _gimbal_angles(scenario, gimbal_angles),
+        ),
+        actuator,
+        {name: _vector(f"points[{name!r}]", p, 3) for name, p in (points or {}).items()},
+    )
+
+
+def _gimbal_angles(scenario: Scenario, angles: ArrayLike | None) -> np.ndarray:
+    count = scenario.cluster.count
+    own = scenario.cluster.gimbal_angles or np.zeros(count)
+    return _vector("gimbal angles", own if angles is None else angles, count)
+
+
+def _vector(name: str, value: ArrayLike, size: int) -> np.ndarray:
+    vector = np.asarray(value, dtype=float)
+    if vector.shape != (size,) or not np.all(np.isfinite(vector)):
+        raise ValueError(f"{name}: expected {size} finite numbers, got {value!r}")
+    return vector
 
 
 def _as_run(scenario: Scenario | str, mount: Mount | None, duration: float | None) -> Scenario:

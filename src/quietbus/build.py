@@ -183,6 +183,7 @@ def _feedforward_inertia(scenario: Scenario, satellite: Satellite) -> np.ndarray
     Plate in its nominal pose, gimbals at their angles at the start, rotors balanced.
     """
     bodies: list[tuple[Any, Any, Any]] = []  # mass, mass centre from B, inertia about it
+    satellite = jax.tree.map(np.asarray, satellite)
     B, P, legs = satellite.bus, satellite.plate, satellite.legs
     bodies.append((B.mass, np.zeros(3), B.I_BBcm_B))
 
@@ -199,7 +200,7 @@ def _feedforward_inertia(scenario: Scenario, satellite: Satellite) -> np.ndarray
             inertia = parts.transverse_inertia[i] * (np.eye(3) - ss) + parts.axial_inertia[i] * ss
             bodies.append((parts.mass[i], ends[i] + sign * parts.distance[i] * s, inertia))
 
-    C = jax.tree.map(np.asarray, satellite.cluster)
+    C = satellite.cluster
     for i, gamma in enumerate(_gimbal_angles(scenario.cluster)):
         R_PG = C.R_PG0[i] @ Rotation.from_rotvec([0.0, 0.0, gamma]).as_matrix()
         R_BG, p_BC_B = R_BP @ R_PG, p_BP_B + R_BP @ C.p_PC_P[i]

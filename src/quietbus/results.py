@@ -195,7 +195,8 @@ def summarize(run: xr.Dataset) -> Summary:
 
 def aliasing(scenario: Scenario) -> str:
     """Why the output rate cannot show the rotors' lines, or an empty text if it can."""
-    fastest = max(abs(unit.rotor.speed) for unit in scenario.cluster.placed()) / (2.0 * np.pi)
+    speeds = [abs(unit.rotor.speed) for unit in scenario.cluster.placed() if unit.rotor]
+    fastest = max(speeds) / (2.0 * np.pi)
     rate = scenario.simulation.output_rate
     if shows(rate, fastest):
         return ""

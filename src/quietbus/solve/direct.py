@@ -85,7 +85,7 @@ def integrate(
             ts = np.full(size, end)
             ts[: len(due)] = due
             piece = _piece(satellite, state, t, end, step, ts, tolerances, with_joint_forces)
-            arrays = jax.tree.leaves(piece.outputs)
+            arrays = [np.asarray(leaf) for leaf in jax.tree.leaves(piece.outputs)]
             if not store:
                 store = [np.empty((count, *leaf.shape[1:])) for leaf in arrays]
             valid = int(np.sum(np.asarray(piece.valid)[: len(due)]))
