@@ -17,7 +17,8 @@ import numpy as np
 
 import quietbus as qb
 from quietbus.analysis.coupled import analyze_coupled, controlled
-from quietbus.analysis.loop import analyze_loop, map_designs
+from quietbus.analysis.designs import map_designs
+from quietbus.analysis.loop import analyze_loop
 from quietbus.study import Study
 
 REPEATS = 20

@@ -1,6 +1,9 @@
+from .analysis.isolator import SingleAxisIsolator as SingleAxisIsolator
 from .api import QuietbusWarning as QuietbusWarning
 from .api import SimulationError as SimulationError
+from .api import analyze as analyze
 from .api import compare as compare
+from .api import linearize as linearize
 from .api import simulate as simulate
 from .results import load_run as load_run
 from .results import save_run as save_run

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from quietbus.results import Summary
     from quietbus.scenario import Scenario
+    from quietbus.study import Study
 
 BAD_INPUT, FAILED = 2, 1
 
@@ -234,6 +235,53 @@ def validate(
     print(f"all {len(checks)} checks passed (errors are relative)")
 
 
+@app.command()
+def analyze(
+    scenario: ScenarioArgument,
+    output: FolderOption = Path("out"),
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON object and nothing else; no pictures.")
+    ] = False,
+    gimbal_angles: Annotated[
+        str | None,
+        typer.Option(help="'30 deg, -30 deg, ...' (or rad), instead of the scenario's."),
+    ] = None,
+) -> None:
+    """Modes, isolator channels, gain range and margins: per axis and of the whole satellite."""
+    checked = _load(scenario, None, None)
+    if gimbal_angles is not None:
+        angles = [angle.strip() for angle in gimbal_angles.split(",")]
+        checked = checked.with_overrides({"cluster.gimbal_angles": angles})
+    if not as_json:
+        _make_folder(output)
+    _import_heavy()
+    from quietbus import api
+    from quietbus.dynamics.linearize import OperatingPointError
+
+    try:
+        study = api.analyze(checked)
+        if as_json:
+            print(json.dumps(study.to_dict(), indent=2, allow_nan=False))
+            return
+        _print_analysis(study, output)
+    except OperatingPointError as error:
+        raise _BadInput(f"{scenario}: {error}") from None
+
+
+def _print_analysis(study: Study, output: Path) -> None:
+    from quietbus.plots import analysis_figures, save_figures
+    from quietbus.tables import analysis_tables
+
+    for part in analysis_tables(study):
+        print(part) if isinstance(part, str) else _print(part)
+    with _status() as tell:
+        tell("drawing")
+        figures = analysis_figures(study)
+        save_figures(figures, output)
+    (output / "analysis.json").write_text(json.dumps(study.to_dict(), indent=2) + "\n")
+    print(f"wrote analysis.json and {len(figures)} pictures to {output}/")
+
+
 def _load(name: str, mount: Mount | None, duration: str | None) -> Scenario:
     """The scenario with the command line's values instead of its own."""
     from quietbus.scenario import load_scenario
@@ -324,7 +372,7 @@ def _progress(runs: Mapping[str, float]) -> Iterator[Callable[[str, float], None
     columns = (
         TextColumn("{task.description:>22}"),
         BarColumn(),
-        TextColumn("{task.completed:.0f} of {task.total:g} s"),
+        TextColumn("{task.completed:g} of {task.total:g} s"),
         TimeElapsedColumn(),
         TextColumn("left"),
         TimeRemainingColumn(),

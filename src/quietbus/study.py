@@ -16,18 +16,18 @@ from quietbus.analysis.coupled import (
     controlled,
     stable_gain_range,
 )
+from quietbus.analysis.designs import DesignRule, corner_rule
+from quietbus.analysis.isolator import SingleAxisIsolator
 from quietbus.analysis.loop import (
     PID,
-    DesignRule,
     Loop,
     LoopAnalysis,
     analyze_loop,
     attitude_loop,
-    corner_rule,
     nearest_range,
 )
 from quietbus.analysis.modes import Mode, fixed_base_modes, free_modes
-from quietbus.analysis.transmissibility import Transmissibility, transmissibility
+from quietbus.analysis.transmissibility import Places, Transmissibility, transmissibility
 from quietbus.build import build_satellite
 from quietbus.dynamics.linearize import (
     Actuator,
@@ -129,20 +129,25 @@ class Study:
     @cached_property
     def loop_analyses(self) -> dict[str, LoopAnalysis] | None:
         """Ranges and margins per axis."""
-        return self.loops and {axis: analyze_loop(loop) for axis, loop in self.loops.items()}
+        if self.loops is None:
+            return None
+        return {axis: analyze_loop(loop) for axis, loop in self.loops.items()}
 
     @cached_property
     def rules(self) -> dict[str, DesignRule] | None:
         """Corner over bandwidth per axis."""
-        return self.loop_analyses and {
-            axis: corner_rule(channel.peak_frequency_hz, self.loop_analyses[axis].bandwidth_hz)
+        loops = self.loop_analyses
+        if loops is None:
+            return None
+        return {
+            axis: corner_rule(channel.peak_frequency_hz, loops[axis].bandwidth_hz)
             for axis, channel in zip(AXES, self.channels, strict=True)
         }
 
     @cached_property
     def controlled(self) -> ControlledSatellite | None:
         """The loop around the whole satellite, with gimbal servos if the gimbals are steered."""
-        return self.pid and controlled(self.linear(self._actuator), self.pid)
+        return controlled(self.linear(self._actuator), self.pid) if self.pid else None
 
     @property
     def _actuator(self) -> Actuator:
@@ -151,14 +156,14 @@ class Study:
     @cached_property
     def coupled(self) -> CoupledAnalysis | None:
         """Ranges and margins of all axes together."""
-        return self.controlled and analyze_coupled(self.controlled)
+        return analyze_coupled(self.controlled) if self.controlled else None
 
     @cached_property
     def truth(self) -> list[dict[str, Any]] | None:
         """What the per-axis analysis says, and what is so: one simplification lifted at a time."""
         if self.pid is None or self.loop_analyses is None:
             return None
-        rows = [
+        rows: list[dict[str, Any]] = [
             {
                 "case": f"per axis, {axis}: base fixed, massless legs, ideal gimbals",
                 "stable_gain_range": analysis.stable_gain_range,
@@ -202,15 +207,36 @@ class Study:
         fixed = linearize(clamped(self.satellite), self.point, "ideal")
         return {"fixed_base": fixed_base_modes(fixed), "free": free_modes(self.linear("ideal"))}
 
+    @property
+    def vertical_isolator(self) -> SingleAxisIsolator:
+        """The platform as one mass on one strut, along the base plate's z axis."""
+        legs = self.satellite.legs
+        lower, upper = self.scenario.isolator.joints()
+        along = ((upper - lower)[:, 2] / np.linalg.norm(upper - lower, axis=1)) ** 2
+        mass = platform_inertia(self.satellite, self.gimbal_angle)[0]
+        return SingleAxisIsolator(
+            mass, float(along @ np.asarray(legs.stiffness)), float(along @ np.asarray(legs.damping))
+        )
+
+    @property
+    def rotor_frequencies_hz(self) -> np.ndarray:
+        """Frequencies [Hz] at which rotors turn, ascending; 100 Hz if none does."""
+        turns = np.abs(np.asarray(self.satellite.cluster.rotor_speed)) / (2.0 * np.pi)
+        distinct = np.unique(np.round(turns[turns > 0.0], 9))
+        return distinct if distinct.size else np.array([100.0])
+
     def transmissibility(self, frequency_hz: np.ndarray) -> Transmissibility:
         """Transmissibility of the platform on the free satellite at frequencies [Hz]."""
-        mass, center, inertia = platform_inertia(self.satellite, self.gimbal_angle)
         rigid = replace(self.satellite, mount="rigid")
+        places = Places(
+            mass=float(self.satellite.bus.mass),
+            inertia=np.asarray(self.satellite.bus.I_BBcm_B),
+            base=np.asarray(self.scenario.isolator.offset),
+            R_BP=np.asarray(quaternion_to_matrix(self.satellite.q_BP)),
+            center=platform_inertia(self.satellite, self.gimbal_angle)[1],
+        )
         return transmissibility(
-            self.linear("ideal"),
-            linearize(rigid, self.point, "ideal"),
-            _spatial_inertia(mass, center, inertia),
-            frequency_hz,
+            self.linear("ideal"), linearize(rigid, self.point, "ideal"), places, frequency_hz
         )
 
     def limits_by_height(self, heights: np.ndarray) -> np.ndarray:
@@ -282,10 +308,3 @@ def at_height(satellite: Satellite, height: float) -> Satellite:
     shift = np.array([0.0, 0.0, height - float(satellite.p_BP_B[2])])
     places = lambda s: (s.p_BP_B, s.legs.p_BA_B)  # noqa: E731
     return eqx.tree_at(places, satellite, tuple(value + shift for value in places(satellite)))
-
-
-def _spatial_inertia(mass: float, center: np.ndarray, inertia: np.ndarray) -> np.ndarray:
-    x, y, z = mass * center
-    c = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    about_origin = inertia + mass * (center @ center * np.eye(3) - np.outer(center, center))
-    return np.block([[mass * np.eye(3), -c], [c, about_origin]])

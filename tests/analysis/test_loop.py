@@ -10,19 +10,17 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from quietbus.analysis.channels import SymbolicChannel
+from quietbus.analysis.designs import corner_rule, map_designs
 from quietbus.analysis.loop import (
     PID,
     Loop,
     analyze_loop,
     attitude_loop,
-    corner_rule,
-    frequency_response,
-    map_designs,
     nearest_range,
     nyquist_counts,
-    root_locus,
     stable_gain_range,
 )
+from quietbus.analysis.loop_response import frequency_response, root_locus
 
 INERTIA = 1100.0
 PRINTED = SymbolicChannel((1.0, 0.036), (70.3, 3.69, 0.036))

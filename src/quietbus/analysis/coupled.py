@@ -52,6 +52,17 @@ class ControlledSatellite:
         resolvent = np.linalg.solve(s * np.eye(len(self.A)) - self.A, self.B.astype(complex))
         return self.gain * (self.F @ resolvent)
 
+    def axis_loops(self, omega: np.ndarray) -> np.ndarray:
+        """Loop of each axis (frequency, 3) with the other two closed, at frequencies [rad/s]."""
+        L = self.loop(omega)
+        columns = []
+        for i in range(3):
+            others = [j for j in range(3) if j != i]
+            closed = np.eye(2) + L[:, others][:, :, others]
+            through = np.linalg.solve(closed, L[:, others, i, None])[..., 0]
+            columns.append(L[:, i, i] - np.einsum("fj,fj->f", L[:, i, others], through))
+        return np.stack(columns, axis=1)
+
 
 def controlled(model: LinearModel, pid: PID) -> ControlledSatellite:
     """Attitude control around a linear satellite.
@@ -222,9 +233,11 @@ def disk_margin(system: ControlledSatellite) -> float:
     in the disk through (2-alpha)/(2+alpha) and its inverse before the loop becomes unstable.
     """
     poles = system.poles()
-    features = np.abs(poles[np.abs(poles) > 1e-9])
-    grid = np.geomspace(features.min() / 10.0, features.max() * 10.0, 200)
-    omega = np.unique(np.concatenate([grid, np.outer(features, [0.9, 1.0, 1.1]).ravel()]))
+    sizes, widths = np.abs(poles[np.abs(poles) > 1e-9]), np.linspace(-4.0, 4.0, 17)
+    grid = np.geomspace(sizes.min() / 10.0, sizes.max() * 10.0, 200)
+    peaks = poles[poles.imag > 0.0]
+    around = (peaks.imag + np.abs(peaks.real) * widths[:, None]).ravel()
+    omega = np.unique(np.concatenate([grid, around[around > grid[0]]]))
     upper = np.linalg.norm(_balanced(_symmetric(system, omega)), 2, axis=(1, 2))
 
     def mu(log_omega: float) -> float:

@@ -34,23 +34,19 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import polynomial as P
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq, linear_sum_assignment
+from scipy.optimize import brentq
 
-from quietbus.analysis.channels import (
+from quietbus.analysis.channels import json_ready
+from quietbus.analysis.rational import (
     Array,
     Coefficients,
-    SymbolicChannel,
     even_odd,
-    json_ready,
-    peak,
     positive_roots,
     squared_gain,
 )
 
 MARGINAL = 1e-9
 """[-] A pole's real part this small, relative to the pole, counts as on the imaginary axis."""
-ABOUT_A_DECADE = 5.0
-"""[-] Least corner over bandwidth that passes the design rule; the paper's own is 6.7."""
 
 
 # --- the loop ------------------------------------------------------------------------------
@@ -74,6 +70,11 @@ class PID:
         """
         tp, tq = zeros
         return cls(kp=gain * (tp + tq), ki=gain * tp * tq, kd=gain)
+
+    @property
+    def zeros(self) -> tuple[complex, ...]:
+        """Zeros of PID(s) [rad/s] away from the origin."""
+        return tuple(root for root in np.roots([self.kd, self.kp, self.ki]).tolist() if root)
 
     @property
     def gain(self) -> float:
@@ -293,7 +294,7 @@ def between(marks: Array) -> Array:
     return np.concatenate([[marks[0] / 2.0], np.sqrt(marks[:-1] * marks[1:]), [2.0 * marks[-1]]])
 
 
-def _crossings(loop: Loop) -> list[_Crossing]:
+def phase_crossings(loop: Loop) -> list[_Crossing]:
     """All passages through the negative real axis from s = 0, over the arc, up to j infinity.
 
     The arc around poles at the origin leads from the real axis, at infinity, clockwise through
@@ -337,7 +338,7 @@ def _solve(function: Callable[[Any], Any], low: float, high: float) -> float:
     return float(brentq(lambda w: float(function(w)), low, high, xtol=1e-15 * low, rtol=1e-15))
 
 
-def _crossovers(loop: Loop) -> list[tuple[float, bool]]:
+def gain_crossings(loop: Loop) -> list[tuple[float, bool]]:
     """Frequencies [rad/s] at which abs(L) passes 1, and whether it falls there."""
     difference = P.polysub(squared_gain(loop.numerator), squared_gain(loop.denominator))
     omega = between(np.sqrt(positive_roots(difference)))
@@ -422,7 +423,7 @@ def nyquist_counts(loop: Loop, gain: float | None = None) -> Nyquist | None:
     """Nyquist counts at gain K (the chosen one by default); None if the plot meets -1."""
     if loop.is_zero:
         return Nyquist(loop.open_loop_unstable, 0, 0, 0, loop.open_loop_unstable)
-    return _count(loop, _crossings(loop), 1.0 if gain is None else gain / loop.gain)
+    return _count(loop, phase_crossings(loop), 1.0 if gain is None else gain / loop.gain)
 
 
 def _count(loop: Loop, crossings: list[_Crossing], scale: float) -> Nyquist | None:
@@ -483,14 +484,14 @@ def _stable_ranges(
 
 def stable_gain_range(loop: Loop) -> tuple[tuple[float, float | None], ...]:
     """All intervals (low, high) of K > 0 with a stable closed loop; high None: no upper end."""
-    return () if loop.is_zero else _stable_ranges(loop, _crossings(loop))
+    return () if loop.is_zero else _stable_ranges(loop, phase_crossings(loop))
 
 
 def analyze_loop(loop: Loop) -> LoopAnalysis:
     """Stability, gain range, margins and Nyquist counts of a loop. Unstable loops are welcome."""
     if loop.is_zero:
         return _no_control(loop)
-    crossings = _crossings(loop)
+    crossings = phase_crossings(loop)
     ranges = _stable_ranges(loop, crossings)
     counts = _count(loop, crossings, 1.0)
     if loop.delay:
@@ -505,7 +506,7 @@ def analyze_loop(loop: Loop) -> LoopAnalysis:
     stable = unstable == 0 and not marginal
 
     finite = [c for c in crossings if math.isfinite(c.log_gain)]
-    crossovers = _crossovers(loop)
+    crossovers = gain_crossings(loop)
     omega_c = np.array([omega for omega, _ in crossovers])
     margins = _wrap_deg(np.degrees(loop.phase(omega_c)) + 180.0) if crossovers else np.empty(0)
     least = int(np.argmin(np.abs(margins))) if crossovers else None
@@ -599,154 +600,6 @@ def _notes(loop: Loop, crossovers: list[tuple[float, bool]], consistent: bool) -
     return tuple(notes)
 
 
-# --- data for pictures ---------------------------------------------------------------------
-
-
-@dataclass(frozen=True, eq=False)
-class FrequencyResponse:
-    """Bode and Nyquist data of a loop."""
-
-    omega: Array  # (n,) [rad/s]
-    response: NDArray[np.complex128]  # (n,) [-] L(j omega)
-    phase_deg: Array  # (n,) [deg] continuous, from -90 degrees per integrator
-
-    @property
-    def frequency_hz(self) -> Array:
-        """[Hz]."""
-        return self.omega / (2.0 * math.pi)
-
-    @property
-    def magnitude_db(self) -> Array:
-        """[dB]."""
-        return 20.0 * np.log10(np.abs(self.response))
-
-
-def frequency_response(loop: Loop, omega: ArrayLike | None = None) -> FrequencyResponse:
-    """Response of a loop that is not zero, by default on a grid with all crossings in it.
-
-    Args:
-        loop: the loop.
-        omega: (n,) angular frequencies [rad/s].
-    """
-    if omega is None:
-        marks = [c.omega for c in _crossings(loop) if c.omega > 0 and math.isfinite(c.log_gain)]
-        marks += [crossover for crossover, _ in _crossovers(loop)]
-        grid = np.unique(np.append(frequency_grid(loop), marks))
-    else:
-        grid = np.asarray(omega, float)
-    return FrequencyResponse(grid, loop.response(grid), np.degrees(loop.phase(grid)))
-
-
-@dataclass(frozen=True, eq=False)
-class RootLocus:
-    """Closed-loop poles over the gain, one column per branch."""
-
-    gains: Array  # (m,) K
-    poles: NDArray[np.complex128]  # (m, n) [rad/s] each column continuous in K
-
-
-def root_locus(loop: Loop, gains: ArrayLike | None = None) -> RootLocus:
-    """Closed-loop poles for many gains, matched into continuous branches.
-
-    Args:
-        loop: the loop; a delay is left out, having no finite locus.
-        gains: (m,) rising K; by default dense over six decades around the chosen gain and the
-            ends of the stable range.
-    """
-    if gains is None:
-        ends = [end for pair in stable_gain_range(loop) for end in pair if end]
-        marks = np.array([*ends, loop.gain or 1.0])
-        gains = np.unique(
-            np.append(np.geomspace(marks.min() * 1e-3, marks.max() * 1e3, 1200), marks)
-        )
-    gains = np.asarray(gains, float)
-    scales = gains / loop.gain if loop.gain else np.zeros_like(gains)
-    poles = np.array([np.roots(loop.closed_loop_polynomial(scale)) for scale in scales], complex)
-    for i in range(1, len(poles)):
-        before, now = poles[i - 1][:, None], poles[i][None, :]
-        size = np.abs(before) + np.abs(now)
-        distance = np.abs(before - now) / np.where(size > 0, size, 1.0)
-        poles[i] = poles[i][linear_sum_assignment(distance)[1]]
-    return RootLocus(gains, poles)
-
-
-# --- many designs, and the paper's rule ----------------------------------------------------
-
-
-@dataclass(frozen=True, eq=False)
-class DesignMap:
-    """Loop and isolator figures of m isolator designs (k, c); NaN where there is none."""
-
-    stiffness: Array  # (m,) [N/m]
-    damping: Array  # (m,) [N s/m]
-    stable: NDArray[np.bool_]  # (m,) at the chosen gain
-    gain_low: Array  # (m,) K, of the stable range that holds or is nearest to the chosen gain
-    gain_high: Array  # (m,) K, inf for no upper end
-    gain_margin_db: Array  # (m,) [dB] from the chosen gain up to `gain_high`
-    phase_margin_deg: Array  # (m,) [deg]
-    crossover_hz: Array  # (m,) [Hz]
-    peak_frequency_hz: Array  # (m,) [Hz] of the channel
-    peak_gain: Array  # (m,) [-] of the channel
-
-
-def map_designs(
-    channel: SymbolicChannel,
-    stiffness: ArrayLike,
-    damping: ArrayLike,
-    inertia: float,
-    pid: PID,
-    *,
-    servo_bandwidth: float | None = None,
-    delay: float = 0.0,
-    sampling_period: float | None = None,
-) -> DesignMap:
-    """Gain range, margins and isolation peak for many isolator designs.
-
-    Args:
-        channel: the channel with k and c as symbols.
-        stiffness, damping: leg k [N/m] and c [N s/m], broadcast against each other.
-        inertia, pid, servo_bandwidth, delay, sampling_period: as in `attitude_loop`.
-
-    Raises:
-        ValueError: all gains of the PID are zero, or what `attitude_loop` refuses.
-    """
-    if not pid.gain:
-        raise ValueError("pid: expected a gain that is not zero; without control there is no map")
-    k, c = (np.ravel(a) for a in np.broadcast_arrays(stiffness, damping))
-    rows = []
-    for k_i, c_i in zip(k.tolist(), c.tolist(), strict=True):
-        numerator, denominator = channel.coefficients(k_i, c_i)
-        result = analyze_loop(
-            attitude_loop(
-                numerator,
-                denominator,
-                inertia,
-                pid,
-                servo_bandwidth=servo_bandwidth,
-                delay=delay,
-                sampling_period=sampling_period,
-            )
-        )
-        low, high = nearest_range(result.stable_gain_range, pid.gain)
-        peak_frequency, peak_gain = peak(numerator, denominator)
-        rows.append(
-            (
-                result.stable,
-                low,
-                high,
-                20.0 * math.log10(high / pid.gain) if high > 0 else math.nan,
-                math.nan if result.phase_margin_deg is None else result.phase_margin_deg,
-                math.nan if result.crossover_hz is None else result.crossover_hz,
-                peak_frequency / (2.0 * math.pi),
-                peak_gain,
-            )
-        )
-    columns = np.array(rows, float).reshape(-1, 8).T
-    return DesignMap(
-        np.asarray(k, float), np.asarray(c, float), columns[0].astype(bool), *columns[1:]
-    )
-
-
 def nearest_range(
     ranges: tuple[tuple[float, float | None], ...], gain: float
 ) -> tuple[float, float]:
@@ -762,36 +615,3 @@ def nearest_range(
         return max(ends[0] / gain, gain / ends[1], 1.0)
 
     return min(closed, key=distance)
-
-
-@dataclass(frozen=True)
-class DesignRule:
-    """The paper's rule: the isolator's corner about one decade above the control bandwidth."""
-
-    ratio: float | None  # [-] peak frequency of the channel over bandwidth; None: no bandwidth
-    passed: bool
-    words: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return json_ready(dataclasses.asdict(self))
-
-
-def corner_rule(peak_frequency_hz: float, bandwidth_hz: float | None) -> DesignRule:
-    """Check the isolator's corner against the bandwidth of the attitude control.
-
-    Args:
-        peak_frequency_hz: of the channel [Hz].
-        bandwidth_hz: of the loop [Hz], None if it has none.
-    """
-    if bandwidth_hz is None:
-        return DesignRule(None, False, "The loop has no crossover, so there is nothing to compare.")
-    ratio = peak_frequency_hz / bandwidth_hz
-    passed = ratio >= ABOUT_A_DECADE
-    judgement = "about a decade or more, as it should be" if passed else "too near"
-    words = (
-        f"The isolator's corner ({peak_frequency_hz:.3g} Hz) is {ratio:.1f} times the control "
-        f"bandwidth ({bandwidth_hz:.3g} Hz): {judgement} (rule: about 10, at least "
-        f"{ABOUT_A_DECADE:g})."
-    )
-    return DesignRule(ratio, passed, words)

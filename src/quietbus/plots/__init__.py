@@ -1,7 +1,8 @@
 """Pictures of runs, good enough for a paper; they show what the results hold."""
 
+from quietbus.plots.analysis import analysis_figures
 from quietbus.plots.compare import compare_figures
 from quietbus.plots.run import run_figures
 from quietbus.plots.style import save_figures
 
-__all__ = ["compare_figures", "run_figures", "save_figures"]
+__all__ = ["analysis_figures", "compare_figures", "run_figures", "save_figures"]

@@ -33,11 +33,16 @@ def solve_positive_definite(M: Float[Array, "n n"], f: Float[Array, " n"]) -> Fl
     Such a matrix needs no pivoting. A LAPACK call would do the same, but it is opaque to XLA and
     keeps the integrator's loop from being compiled as one piece (see jaxconfig).
     """
-    rows = jnp.concatenate([M, f[:, None]], axis=1)
-    for i in range(len(f)):
-        pivot = rows[i] / rows[i, i]
-        rows = (rows - rows[:, i : i + 1] * pivot).at[i].set(pivot)
-    return rows[:, -1]
+    rest = jnp.concatenate([M, f[:, None]], axis=1)
+    pivots = []
+    for _ in range(len(f)):
+        pivot = rest[0] / rest[0, 0]
+        pivots.append(pivot)
+        rest = rest[1:, 1:] - rest[1:, :1] * pivot[1:]
+    x = jnp.zeros(0)
+    for pivot in reversed(pivots):
+        x = jnp.concatenate([(pivot[-1] - pivot[1:-1] @ x)[None], x])
+    return x
 
 
 @solve_positive_definite.defjvp
