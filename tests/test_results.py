@@ -102,10 +102,9 @@ def test_residual_separates_a_line_from_slow_motion():
     slow = 1e-3 * np.exp(-0.08 * t)
     line = 2e-6 * np.sin(2.0 * np.pi * 100.0 * t + 0.25 * np.pi)
     rest = residual(t, np.column_stack([slow + line, slow]))
-    sampled_peak = 2e-6 * np.max(np.abs(np.sin(0.2 * np.pi * np.arange(10) + 0.25 * np.pi)))
-    assert rest.jitter_peak[0] == pytest.approx(sampled_peak, rel=1e-3)
+    assert rest.jitter_peak[0] == pytest.approx(2e-6, rel=3e-3)  # no sample falls on the peak
     assert rest.jitter_rms[0] == pytest.approx(2e-6 / np.sqrt(2.0), rel=1e-3)
-    assert rest.jitter_peak[1] < 1e-10
+    assert rest.jitter_peak[1] < 1e-10  # nothing but slow motion
     assert rest.slow[1] == pytest.approx(1e-3 * np.exp(-0.08 * 9.25), rel=1e-3)
 
 

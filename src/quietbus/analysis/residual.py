@@ -3,8 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import resample_poly
 
 RESOLVING = 2.56  # samples per period that a line needs to be seen, the practice of vibration test
+FINER = 8  # band-limited interpolation for the peak, which seldom falls on a sample
 
 
 @dataclass(frozen=True)
@@ -22,7 +24,8 @@ def residual(time: np.ndarray, signal: np.ndarray, window: float = 1.0) -> Resid
 
     The slow motion is the cubic that fits best under a Hann weight; jitter is what remains in the
     middle half of the window, where the fit has no ends to bend at. A cubic over one second follows
-    what an attitude loop does (below 1 Hz) and leaves a line at 10 Hz or more untouched.
+    what an attitude loop does (below 1 Hz) and leaves a line at 10 Hz or more untouched. The peak
+    is that of the band-limited signal between the samples.
 
     Args:
         time: (n,) [s], evenly spaced.
@@ -42,13 +45,14 @@ def residual(time: np.ndarray, signal: np.ndarray, window: float = 1.0) -> Resid
     weight = np.cos(0.5 * np.pi * x)[:, None]  # of the amplitude; its square is Hann's window
     fit = np.linalg.lstsq(weight * basis, weight * values, rcond=None)[0]
     middle = np.abs(x) <= 0.5
-    slow = basis[middle] @ fit
-    jitter = values[middle] - slow
+    jitter = values - basis @ fit
+    fine = resample_poly(jitter, FINER, 1)[: FINER * (len(t) - 1) + 1]
+    between = np.abs(np.linspace(-1.0, 1.0, len(fine))) <= 0.5
     return Residual(
         window=(float(t[middle][0]), float(t[middle][-1])),
-        jitter_peak=np.max(np.abs(jitter), axis=0),
-        jitter_rms=np.sqrt(np.mean(jitter**2, axis=0)),
-        slow=np.max(np.abs(slow), axis=0),
+        jitter_peak=np.max(np.abs(fine[between]), axis=0),
+        jitter_rms=np.sqrt(np.mean(jitter[middle] ** 2, axis=0)),
+        slow=np.max(np.abs(basis[middle] @ fit), axis=0),
     )
 
 
