@@ -1,0 +1,158 @@
+"""Tables of the linear analysis for the terminal."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from quietbus.study import Study
+
+AXES = ("x", "y", "z")
+Ranges = tuple[tuple[float, float | None], ...]
+
+
+def analysis_tables(study: Study) -> Iterator[Table | str]:
+    """All that ``quietbus analyze`` prints: tables and sentences, in order."""
+    yield _channels(study)
+    loops, coupled = study.loop_analyses, study.coupled
+    if loops and coupled and study.rules:
+        yield _loops(study)
+        yield from (f"{axis}: {loop.verdict}" for axis, loop in loops.items())
+        yield from (f"{axis}: {note}" for axis, loop in loops.items() for note in loop.notes)
+        yield _truth(study)
+        yield f"All axes together: {coupled.verdict}"
+        if coupled.stable:
+            yield (
+                f"Every axis may at once change by {_number(coupled.disk_gain_margin_db)} dB or "
+                f"{coupled.disk_phase_margin_deg:.3g} deg (disk margin {coupled.disk_margin:.3g})."
+            )
+        yield "\nDesign rule, the isolator's corner about a decade above the control bandwidth:"
+        for axis, rule in study.rules.items():
+            yield f"{axis}: {'met' if rule.passed else 'NOT MET'}. {rule.words}"
+    yield _modes(study)
+    yield _transmissibility(study)
+    yield from (f"note: {note}" for note in study.notes)
+
+
+def range_text(ranges: Ranges) -> str:
+    """Stable gains in short: ``0.55 - 9122``."""
+    parts = [f"{low:.4g} - {'any' if high is None else f'{high:.4g}'}" for low, high in ranges]
+    return ", ".join(parts) or "none"
+
+
+def _table(title: str, *columns: str) -> Table:
+    """The first column holds names, the others numbers."""
+    table = Table(title=title, box=SIMPLE_HEAD, title_justify="left")
+    for i, column in enumerate(columns):
+        table.add_column(column, justify="right" if i else "left", overflow="fold")
+    return table
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else "inf" if math.isinf(value) else f"{value:.4g}"
+
+
+def _numbers(values: Sequence[float]) -> str:
+    return ", ".join(f"{value:.4g}" for value in values) or "-"
+
+
+def _channels(study: Study) -> Table:
+    table = _table(
+        f"{study.scenario.name}: torque channels of the platform, base fixed, massless legs",
+        "axis",
+        "peak\nHz",
+        "peak\ngain",
+        "-3 dB\nHz",
+        "undamped\nHz",
+        "damped\nHz",
+        "damping\n-",
+        "to other\naxes",
+    )
+    for channel in study.channels:
+        table.add_row(
+            channel.axis,
+            _number(channel.peak_frequency_hz),
+            _number(channel.peak_gain),
+            _number(channel.minus_3db_frequency_hz),
+            _numbers(channel.undamped_frequencies_hz),
+            _numbers([pole.damped_frequency_hz for pole in channel.poles]),
+            _numbers([pole.damping_ratio for pole in channel.poles]),
+            _number(channel.coupling),
+        )
+    return table
+
+
+def _loops(study: Study) -> Table:
+    assert study.loop_analyses is not None
+    gain = next(iter(study.loop_analyses.values())).gain
+    table = _table(
+        f"Attitude loops, each axis on its own, K = {gain:.4g}", "", *(f"{a}" for a in AXES)
+    )
+    loops = study.loop_analyses.values()
+    table.add_row("stable K", *(range_text(loop.stable_gain_range) for loop in loops))
+    table.add_row("gain margins, dB", *(_numbers(loop.gain_margins_db) for loop in loops))
+    table.add_row("  at, Hz", *(_numbers(loop.gain_margin_frequencies_hz) for loop in loops))
+    table.add_row("phase margin, deg", *(_number(loop.phase_margin_deg) for loop in loops))
+    table.add_row("crossover, Hz", *(_number(loop.crossover_hz) for loop in loops))
+    table.add_row("bandwidth, Hz", *(_number(loop.bandwidth_hz) for loop in loops))
+    table.add_row("delay margin, s", *(_number(loop.delay_margin_s) for loop in loops))
+    counts = [loop.nyquist for loop in loops]
+    table.add_row(
+        "P, N1, N2, N, Z",
+        *("-" if n is None else f"{n.P}, {n.N1:g}, {n.N2:g}, {n.N:g}, {n.Z:g}" for n in counts),
+    )
+    return table
+
+
+def _truth(study: Study) -> Table:
+    table = _table(
+        "What the analysis per axis says, and what is so",
+        "",
+        "stable K",
+        "gain margins\ndB",
+        "disk\nmargin",
+    )
+    for row in study.truth or ():
+        table.add_row(
+            row["case"],
+            range_text(row["stable_gain_range"]),
+            _numbers(row["gain_margins_db"]),
+            _number(row.get("disk_margin")),
+        )
+    return table
+
+
+def _modes(study: Study) -> Table:
+    table = _table("Modes of the platform", "", "undamped\nHz", "damped\nHz", "damping\n-")
+    for base, title in (("fixed_base", "base fixed"), ("free", "free satellite")):
+        for mode in study.modes[base]:
+            table.add_row(
+                f"{title}: {mode.name}",
+                _number(mode.frequency_hz),
+                _number(mode.damped_frequency_hz),
+                f"{mode.damping:.3f}",
+            )
+    return table
+
+
+def _transmissibility(study: Study) -> Table:
+    frequencies = study.rotor_frequencies_hz
+    table = _table(
+        "What passes at the rotors' frequencies, largest over all directions",
+        "",
+        *(f"{frequency:.4g} Hz" for frequency in frequencies),
+    )
+    passed = study.transmissibility(frequencies)
+    for i, cause in enumerate(("force", "torque")):
+        base = (f"{100 * value:.3g} %" for value in passed.largest_base[:, i])
+        table.add_row(f"{cause} on the plate to {cause} on the base", *base)
+    for i, cause in enumerate(("force", "torque")):
+        rate = (f"{100 * value:.3g} %" for value in passed.rate_ratio[:, i])
+        table.add_row(f"bus rate by a {cause}, isolated over rigid", *rate)
+    return table
