@@ -19,7 +19,6 @@ import typer
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from quietbus.results import Summary
     from quietbus.scenario import Scenario
     from quietbus.study import Study
 
@@ -108,6 +107,7 @@ def simulate(
     _import_heavy()
     from quietbus import api
     from quietbus.results import save_run, summarize
+    from quietbus.tables import summary_table
 
     chosen = checked.isolator.mount
     output = output or Path(f"{checked.name}-{chosen}.nc")
@@ -125,7 +125,7 @@ def simulate(
             _fail("interrupted before the first second was done; nothing to keep")
     save_run(run, output)
     if run.sizes["time"] > 1:
-        _print(_table({chosen: summarize(run)}))
+        _print(summary_table({chosen: summarize(run)}))
     print(f"wrote {output}")
     if run.attrs["status"] != "complete":
         _fail(f"the run is not complete: {run.attrs['stop_reason']}")
@@ -144,6 +144,7 @@ def compare(
     from quietbus import api
     from quietbus.plots import compare_figures, run_figures, save_figures
     from quietbus.results import save_run, summarize
+    from quietbus.tables import summary_table
 
     with _progress(dict.fromkeys(Mount, checked.simulation.duration)) as tell, _notes():
         try:
@@ -155,7 +156,7 @@ def compare(
     broken = [f"{m}: {r.attrs['stop_reason']}" for m, r in runs.items() if r.attrs["stop_reason"]]
     if all(run.sizes["time"] > 1 for run in runs.values()):
         summaries = {str(mount): summarize(run) for mount, run in runs.items()}
-        _print(_table(summaries))
+        _print(summary_table(summaries))
         numbers = {mount: summary.to_dict() for mount, summary in summaries.items()}
         (output / "summary.json").write_text(json.dumps(numbers, indent=2) + "\n")
         figures = compare_figures(runs) | {
@@ -208,6 +209,7 @@ def validate(
     _import_heavy()
     from quietbus import validate as checking
     from quietbus.build import build_initial_state, build_satellite
+    from quietbus.tables import checks_table
 
     satellite = build_satellite(checked)
     state = build_initial_state(checked, satellite)
@@ -219,16 +221,7 @@ def validate(
             checks = checking.validate(satellite, state, progress=tell)
     except ImportError as error:
         _fail(str(error))
-    table = _new_table(f"{checked.name}, {checked.isolator.mount}: quietbus against MuJoCo")
-    for column, justify in (("check", "left"), ("error", "right"), ("bound", "right")):
-        table.add_column(column, justify=justify)  # type: ignore[arg-type]
-    table.add_column("verdict")
-    for check in checks:
-        verdict = "pass" if check.passed else "FAIL"
-        table.add_row(
-            f"{check.name}: {check.compares}", f"{check.error:.1e}", f"{check.bound:.0e}", verdict
-        )
-    _print(table)
+    _print(checks_table(f"{checked.name}, {checked.isolator.mount}", checks))
     failed = [check.name for check in checks if not check.passed]
     if failed:
         _fail(f"{len(failed)} of {len(checks)} checks failed: {', '.join(failed)}")
@@ -302,53 +295,6 @@ def _import_heavy() -> None:
             tell("loading JAX")
             import quietbus.api
     import quietbus.api  # noqa: F401
-
-
-def _table(summaries: Mapping[str, Summary]) -> Table:
-    """The numbers of one run, or of two side by side with their ratio."""
-    import numpy as np
-
-    both = len(summaries) == 2
-    first = next(iter(summaries.values()))
-    table = _new_table(f"Residual motion {first.residual_note}")
-    table.add_column("")
-    table.add_column("unit")
-    for mount in summaries:
-        table.add_column(mount, justify="right")
-    if both:
-        table.add_column("isolated / rigid", justify="right")
-
-    def row(name: str, unit: str, value: Callable[[Summary], float | None], ratio: bool) -> None:
-        values = [value(summary) for summary in summaries.values()]
-        cells = ["n/a" if v is None else f"{v:.4g}" for v in values]
-        if both:
-            known = ratio and None not in values and values[1]
-            cells.append(f"{100 * values[0] / values[1]:.3g} %" if known else "")  # type: ignore[operator]
-        table.add_row(name, unit, *cells)
-
-    degrees = lambda vector, i: None if vector is None else float(np.degrees(vector[i]))  # noqa: E731
-    for i, axis in enumerate("xyz"):
-        name = f"rate jitter {axis}, peak"
-        row(name, "deg/s", lambda s, i=i: degrees(s.residual_rate, i), True)  # type: ignore[misc]
-    for i, axis in enumerate("xyz"):
-        name = f"rate jitter {axis}, RMS"
-        row(name, "deg/s", lambda s, i=i: degrees(s.residual_rate_rms, i), True)  # type: ignore[misc]
-    for i, axis in enumerate("xyz"):
-        name = f"slow rate {axis}, peak"
-        row(name, "deg/s", lambda s, i=i: degrees(s.slow_rate, i), False)  # type: ignore[misc]
-    row("pointing error, last second", "deg", lambda s: float(np.degrees(s.pointing_error)), False)
-    row("peak gimbal rate", "deg/s", lambda s: float(np.degrees(s.peak_gimbal_rate)), False)
-    row("largest strut stroke", "mm", lambda s: 1e3 * s.peak_stroke, False)
-    row("largest strut force", "N", lambda s: s.peak_strut_force, False)
-    row("least singularity measure", "-", lambda s: s.minimum_singularity, False)
-    return table
-
-
-def _new_table(title: str) -> Table:
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-
-    return Table(title=title, box=SIMPLE_HEAD, title_justify="left")
 
 
 def _print(table: Table) -> None:

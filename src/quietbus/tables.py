@@ -1,4 +1,4 @@
-"""Tables of the linear analysis for the terminal."""
+"""Tables for the terminal: the numbers of runs, of checks and of the linear analysis."""
 
 from __future__ import annotations
 
@@ -9,12 +9,70 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
+    from quietbus.results import Summary
     from quietbus.study import Study
+    from quietbus.validate import Check
 
 AXES = ("x", "y", "z")
 Ranges = tuple[tuple[float, float | None], ...]
+
+
+def summary_table(summaries: Mapping[str, Summary]) -> Table:
+    """The numbers of one run, or of two side by side with their ratio."""
+    both = len(summaries) == 2
+    first = next(iter(summaries.values()))
+    table = Table(title=f"Residual motion {first.residual_note}", box=SIMPLE_HEAD)
+    table.title_justify = "left"
+    table.add_column("")
+    table.add_column("unit")
+    for mount in summaries:
+        table.add_column(mount, justify="right")
+    if both:
+        table.add_column("isolated / rigid", justify="right")
+
+    def row(name: str, unit: str, value: Callable[[Summary], float], ratio: bool = False) -> None:
+        values = [value(summary) for summary in summaries.values()]
+        cells = ["n/a" if math.isnan(v) else f"{v:.4g}" for v in values]
+        if both:
+            known = ratio and not math.isnan(sum(values)) and values[1] != 0.0
+            cells.append(f"{100 * values[0] / values[1]:.3g} %" if known else "")
+        table.add_row(name, unit, *cells)
+
+    for name, field in (
+        ("rate jitter {}, peak", "residual_rate"),
+        ("rate jitter {}, RMS", "residual_rate_rms"),
+        ("slow rate {}, peak", "slow_rate"),
+    ):
+        for i, axis in enumerate(AXES):
+            value = lambda s, i=i, field=field: _degrees(getattr(s, field), i)  # noqa: E731
+            row(name.format(axis), "deg/s", value, ratio=field != "slow_rate")
+    row("pointing error at the end", "deg", lambda s: math.degrees(s.pointing_error))
+    row("peak gimbal rate", "deg/s", lambda s: math.degrees(s.peak_gimbal_rate))
+    row("largest strut stroke", "mm", lambda s: 1e3 * s.peak_stroke)
+    row("largest strut force", "N", lambda s: s.peak_strut_force)
+    row("least singularity measure", "-", lambda s: s.minimum_singularity)
+    return table
+
+
+def _degrees(vector: Sequence[float] | None, i: int) -> float:
+    return math.nan if vector is None else math.degrees(vector[i])
+
+
+def checks_table(name: str, checks: Sequence[Check]) -> Table:
+    """Errors, bounds and verdicts of a validation."""
+    table = Table(title=f"{name}: quietbus against MuJoCo", box=SIMPLE_HEAD)
+    table.title_justify = "left"
+    table.add_column("check")
+    table.add_column("error", justify="right")
+    table.add_column("bound", justify="right")
+    table.add_column("verdict")
+    for check in checks:
+        verdict = "pass" if check.passed else "FAIL"
+        what = f"{check.name}: {check.compares}"
+        table.add_row(what, f"{check.error:.1e}", f"{check.bound:.0e}", verdict)
+    return table
 
 
 def analysis_tables(study: Study) -> Iterator[Table | str]:
