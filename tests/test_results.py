@@ -109,8 +109,14 @@ def test_residual_separates_a_line_from_slow_motion():
 
 
 def test_residual_of_too_few_samples_is_refused():
-    with pytest.raises(ValueError, match="the last 1 s hold 6 samples; a residual needs 8"):
+    with pytest.raises(ValueError, match="the last 1 s hold 6 samples, a residual needs 8"):
         residual(np.arange(20) / 5.0, np.zeros((20, 1)))
+
+
+def test_residual_of_a_run_shorter_than_its_window_is_refused():
+    """A cubic over a few turns would eat the line and show too little jitter."""
+    with pytest.raises(ValueError, match=r"the run lasts 0\.02 s, a residual is of the last 1 s"):
+        residual(np.arange(21) / 1000.0, np.zeros((21, 1)))
 
 
 def test_joint_forces_are_given_when_asked_for():

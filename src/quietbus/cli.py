@@ -6,7 +6,11 @@ Heavy modules are imported inside the commands, so that ``quietbus --help`` answ
 from __future__ import annotations
 
 import json
+import os
+import re
+import signal
 import sys
+import tempfile
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -17,6 +21,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 import typer
 
 if TYPE_CHECKING:
+    import xarray as xr
     from rich.table import Table
 
     from quietbus.scenario import Scenario
@@ -56,7 +61,8 @@ FolderOption = Annotated[Path, typer.Option("-o", "--output", help="Folder for t
 
 
 def main() -> None:
-    """Entry point: one clear message for bad input, never a traceback."""
+    """Entry point: one clear message for bad input, no traceback; Ctrl-C ends with status 1."""
+    signal.signal(signal.SIGINT, _on_interrupt)
     from quietbus.scenario import ScenarioError
 
     try:
@@ -64,6 +70,35 @@ def main() -> None:
     except (ScenarioError, _BadInput) as error:
         print(f"quietbus: {error}", file=sys.stderr)
         sys.exit(BAD_INPUT)
+
+
+class _Stop:
+    """What Ctrl-C does. Set as a flag: an exception in the middle of JAX would be lost or worse."""
+
+    keeping = False  # a run is under way, whose results are to be kept
+    asked = False
+
+
+def _on_interrupt(_signal: int, _frame: object) -> None:
+    # os.write, since Python's own buffers may be in use where the signal comes in between
+    if _Stop.keeping and not _Stop.asked:
+        _Stop.asked = True
+        os.write(
+            2, b"\nquietbus: stopping and keeping what is computed; Ctrl-C again quits at once\n"
+        )
+        return
+    os.write(2, b"\nquietbus: interrupted\n")
+    os._exit(FAILED)
+
+
+@contextmanager
+def _keeping_results() -> Iterator[None]:
+    """From here the first Ctrl-C stops the run, not the program."""
+    _Stop.keeping, _Stop.asked = True, False
+    try:
+        yield
+    finally:
+        _Stop.keeping = False
 
 
 class _BadInput(Exception):
@@ -106,27 +141,30 @@ def simulate(
     checked = _load(scenario, mount, duration)
     _import_heavy()
     from quietbus import api
-    from quietbus.results import save_run, summarize
+    from quietbus.results import summarize
     from quietbus.tables import summary_table
 
     chosen = checked.isolator.mount
-    output = output or Path(f"{checked.name}-{chosen}.nc")
-    _check_folder(output.parent)
+    output = output or Path(f"{re.sub(r'[^A-Za-z0-9._-]+', '-', checked.name)}-{chosen}.nc")
+    _check_file(output)
     if joint_forces and chosen == Mount.rigid:
         raise _BadInput("--joint-forces needs the isolated mount: a rigid one leaves them open")
-    with _progress({chosen: checked.simulation.duration}) as tell, _notes():
-        try:
-            run = api.simulate(
-                checked, method.value, joint_forces=joint_forces, progress=lambda t: tell(chosen, t)
-            )
-        except api.SimulationError as error:
-            run = error.run
-        except KeyboardInterrupt:
-            _fail("interrupted before the first second was done; nothing to keep")
-    save_run(run, output)
+    with _keeping_results():
+        with _progress({chosen: checked.simulation.duration}) as tell, _notes():
+            try:
+                run = api.simulate(
+                    checked,
+                    method.value,
+                    joint_forces=joint_forces,
+                    progress=lambda t: tell(chosen, t),
+                )
+            except api.SimulationError as error:
+                run = error.run
+            except KeyboardInterrupt:
+                _fail("interrupted before anything was computed; nothing to keep")
+        _save(run, output)
     if run.sizes["time"] > 1:
         _print(summary_table({chosen: summarize(run)}))
-    print(f"wrote {output}")
     if run.attrs["status"] != "complete":
         _fail(f"the run is not complete: {run.attrs['stop_reason']}")
 
@@ -143,18 +181,21 @@ def compare(
     _import_heavy()
     from quietbus import api
     from quietbus.plots import compare_figures, run_figures, save_figures
-    from quietbus.results import save_run, summarize
+    from quietbus.results import summarize
     from quietbus.tables import summary_table
 
-    with _progress(dict.fromkeys(Mount, checked.simulation.duration)) as tell, _notes():
-        try:
-            runs = api.compare(checked, progress=tell)
-        except KeyboardInterrupt:
-            _fail("interrupted before the first second was done; nothing to keep")
-    for mount, run in runs.items():
-        save_run(run, output / f"{mount}.nc")
+    with _keeping_results():
+        with _progress(dict.fromkeys(Mount, checked.simulation.duration)) as tell, _notes():
+            try:
+                runs = api.compare(checked, progress=tell)
+            except KeyboardInterrupt:
+                _fail("interrupted before both runs had begun; nothing to keep")
+        for mount, run in runs.items():
+            _save(run, output / f"{mount}.nc")
     broken = [f"{m}: {r.attrs['stop_reason']}" for m, r in runs.items() if r.attrs["stop_reason"]]
-    if all(run.sizes["time"] > 1 for run in runs.values()):
+    if _Stop.asked:
+        print(f"no pictures of an interrupted comparison; `quietbus plot {output}/isolated.nc`")
+    elif all(run.sizes["time"] > 1 for run in runs.values()):
         summaries = {str(mount): summarize(run) for mount, run in runs.items()}
         _print(summary_table(summaries))
         numbers = {mount: summary.to_dict() for mount, summary in summaries.items()}
@@ -165,7 +206,7 @@ def compare(
             for name, figure in run_figures(run).items()
         }
         save_figures(figures, output)
-        print(f"wrote the runs, summary.json and {len(figures)} pictures to {output}/")
+        print(f"wrote summary.json and {len(figures)} pictures to {output}/")
     if broken:
         _fail("not complete: " + "; ".join(broken))
 
@@ -205,7 +246,7 @@ def validate(
     """Check a scenario against an independent engine (MuJoCo) and conservation laws."""
     checked = _load(scenario, mount, None)
     if export is not None:
-        _check_folder(export.parent)
+        _check_file(export)
     _import_heavy()
     from quietbus import validate as checking
     from quietbus.build import build_initial_state, build_satellite
@@ -328,6 +369,8 @@ def _progress(runs: Mapping[str, float]) -> Iterator[Callable[[str, float], None
 
         def tell(run: str, t: float) -> None:
             bars.update(tasks[run], completed=t, description=run)
+            if _Stop.asked:
+                raise KeyboardInterrupt
 
         yield tell
 
@@ -352,9 +395,34 @@ def _notes() -> Iterator[None]:
             print(f"note: {warning.message}", file=sys.stderr)
 
 
+def _save(run: xr.Dataset, output: Path) -> None:
+    """Write a run; where that fails, to the folder for temporary files, so that it is not lost."""
+    from quietbus.results import save_run
+
+    try:
+        save_run(run, output)
+    except OSError as error:
+        refuge = Path(tempfile.mkdtemp(prefix="quietbus-")) / output.name
+        save_run(run, refuge)
+        _fail(f"{output}: cannot be written: {error.strerror or error}; the run is in {refuge}")
+    print(f"wrote {output}")
+
+
 def _check_folder(folder: Path) -> None:
     if not folder.is_dir():
         raise _BadInput(f"{folder}: no such folder")
+
+
+def _check_file(file: Path) -> None:
+    """Refuse a file that cannot be written, before anything is computed for it."""
+    _check_folder(file.parent)
+    if file.is_dir():
+        raise _BadInput(f"{file}: is a folder; expected the name of a file")
+    try:
+        with tempfile.TemporaryFile(dir=file.parent):
+            pass
+    except OSError as error:
+        raise _BadInput(f"{file}: cannot be written: {error.strerror or error}") from None
 
 
 def _make_folder(folder: Path) -> None:

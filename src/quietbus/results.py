@@ -5,6 +5,7 @@ import datetime
 import importlib.metadata
 import os
 import pathlib
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -129,15 +130,21 @@ def load_run(path: str | os.PathLike[str]) -> xr.Dataset:
         FileNotFoundError: no such file.
         ValueError: the file is not a run of quietbus.
     """
+    if pathlib.Path(path).is_dir():
+        raise ValueError(f"{path}: is a folder; expected the file of a run")
     if not pathlib.Path(path).is_file():
         raise FileNotFoundError(f"{path}: no such file")
     try:
-        with xr.open_dataset(path, engine="h5netcdf") as stored:
-            run = stored.load()
-    except OSError as error:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of xarray, about files that are no runs anyway
+            with xr.open_dataset(path, engine="h5netcdf") as stored:
+                run = stored.load()
+    except (OSError, ValueError, KeyError) as error:
         raise ValueError(f"{path}: not a NetCDF-4 file ({error})") from None
-    if "quietbus_version" not in run.attrs:
-        raise ValueError(f"{path}: a NetCDF file, but not a run of quietbus")
+    missing = {"time", *VARIABLES} - set(run.variables) or {"scenario", "mount"} - set(run.attrs)
+    if missing:
+        listed = ", ".join(sorted(missing))
+        raise ValueError(f"{path}: a NetCDF file, but not a run of quietbus: it has no {listed}")
     return run
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from quietbus.validate import Check
 
 AXES = ("x", "y", "z")
+NOISE = 1e-10  # [deg/s] jitter that is the integrator's; a ratio to it says nothing
 Ranges = tuple[tuple[float, float | None], ...]
 
 
@@ -36,7 +37,7 @@ def summary_table(summaries: Mapping[str, Summary]) -> Table:
         values = [value(summary) for summary in summaries.values()]
         cells = ["n/a" if math.isnan(v) else f"{v:.4g}" for v in values]
         if both:
-            known = ratio and not math.isnan(sum(values)) and values[1] != 0.0
+            known = ratio and not math.isnan(sum(values)) and values[1] > NOISE
             cells.append(f"{100 * values[0] / values[1]:.3g} %" if known else "")
         table.add_row(name, unit, *cells)
 

@@ -69,6 +69,44 @@ def test_outputs_come_at_the_asked_instants(rate):
     assert np.all(np.isfinite(run.outputs.bus_attitude))
 
 
+@pytest.mark.parametrize("duration", [1.2 - 2e-16, 1.2 + 2e-16, 1.2 + 5e-10])
+def test_duration_a_rounding_off_changes_nothing(duration):
+    expected, run = fly(duration=1.2), fly(duration=duration)
+    np.testing.assert_array_equal(run.time, expected.time)
+    np.testing.assert_allclose(run.outputs.bus_rate, expected.outputs.bus_rate, atol=1e-15)
+    assert run.stopped is None
+
+
+@pytest.mark.parametrize("duration", [0.1 * 3 * 10, 1.0000000000000002, 1e-6])
+def test_instants_a_rounding_apart_do_not_stop_a_run(duration):
+    run = fly(duration=duration)
+    assert run.stopped is None
+    assert len(run.time) == int(duration * 1000.0 + 1e-6) + 1
+
+
+def test_load_with_a_steep_edge_and_a_corner_at_a_piece_end_does_not_stop_a_run():
+    table = {"times": [0, 0.01, 0.0100000001, 0.05, 1.0000000000000002], "values": [0, 0, 1, 1, 0]}
+    load = {"body": "bus", "force": [1.0, 0, 0], "profile": {"table": table}}
+    run = fly(QUIET | {"loads": [load]}, duration=1.2)
+    assert run.stopped is None
+    assert len(run.time) == 1201
+
+
+def test_stiff_run_can_be_watched_and_stopped_within_a_piece():
+    """A slipped unit prefix on the damping: thousands of steps a second of flight."""
+    reached = []
+
+    def watch(t):
+        reached.append(t)
+        if len(reached) == 2:
+            raise KeyboardInterrupt
+
+    run = fly({"isolator.legs.damping": "5 MN*s/m"}, duration=1.0, progress=watch)
+    assert run.interrupted
+    assert 0.0 < reached[0] < reached[1] < 1.0
+    assert len(run.time) == pytest.approx(reached[1] * 1000.0, abs=1.0)
+
+
 def test_pieces_join_without_a_seam():
     """A free bus without rotor motion turns evenly over the joints of the pieces."""
     run = fly(QUIET | {"initial.rate": [0.01, 0, 0], "control": "none"}, duration=2.5 * PIECE)

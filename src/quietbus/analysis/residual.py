@@ -32,12 +32,18 @@ def residual(time: np.ndarray, signal: np.ndarray, window: float = 1.0) -> Resid
         signal: (n, axis).
 
     Raises:
-        ValueError: fewer than eight samples in the window.
+        ValueError: the signal is shorter than the window, or has fewer than eight samples in it.
     """
+    length = time[-1] - time[0]
+    if length < window * (1.0 - 1e-9):
+        raise ValueError(
+            f"not shown: the run lasts {length:.4g} s, a residual is of the last {window:g} s"
+        )
     last = time >= time[-1] - window
     if np.count_nonzero(last) < 8:
         raise ValueError(
-            f"the last {window:g} s hold {np.count_nonzero(last)} samples; a residual needs 8"
+            f"not shown: the last {window:g} s hold {np.count_nonzero(last)} samples, "
+            "a residual needs 8"
         )
     t, values = time[last], signal[last]
     x = 2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0

@@ -6,13 +6,16 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Self
 
-from pydantic import BeforeValidator, ValidationError
+from pydantic import BeforeValidator, ValidationError, model_validator
 
 from quietbus.scenario.base import Duration, Frequency, Part, PositiveNumber, Text, listing
-from quietbus.scenario.control import Control, Initial, Load, Target
-from quietbus.scenario.errors import Path, Problem, ScenarioError, dotted, found
+from quietbus.scenario.control import Control, Initial, Load, PseudoInverse, Target
+from quietbus.scenario.errors import Findings, Path, Problem, ScenarioError, dotted, found
 from quietbus.scenario.hardware import Bus, Cluster, Isolator
 from quietbus.scenario.text import read_yaml, write_yaml
+from quietbus.scenario.units import expected
+
+MOST_SAMPLES = 2e7  # of some 400 bytes each
 
 
 class Tolerances(Part):
@@ -20,6 +23,16 @@ class Tolerances(Part):
 
     relative: PositiveNumber = 1e-8
     absolute: PositiveNumber = 1e-10
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        findings = Findings()
+        for name, least in (("relative", 1e-13), ("absolute", 1e-16)):
+            value = getattr(self, name)
+            if not least <= value <= 1e-2:
+                findings.add(name, f"expected a number from {least:g} to 0.01, got {value:g}")
+        findings.raise_any()
+        return self
 
 
 class Simulation(Part):
@@ -29,8 +42,24 @@ class Simulation(Part):
     output_rate: Frequency = 1000.0
     tolerances: Tolerances = Tolerances()
 
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        findings = Findings()
+        samples = self.duration * self.output_rate
+        if samples > MOST_SAMPLES:
+            findings.add(
+                "output_rate",
+                f"expected at most {MOST_SAMPLES / self.duration:.4g} Hz for {self.duration:g} s, "
+                f"since {MOST_SAMPLES:g} samples fill 8 GiB; got {self.output_rate:g} Hz, "
+                f"{samples:.3g} samples",
+            )
+        findings.raise_any()
+        return self
+
 
 def _none_word(value: Any) -> Any:
+    if value is None or value is False:  # a forgotten value; YAML reads "off" as false
+        raise expected("none, or a mapping with keys among pid, steering, ...", value)
     return None if value == "none" else value
 
 
@@ -57,6 +86,19 @@ class Scenario(Part):
     target: Target = Target()
     loads: Annotated[tuple[Load, ...], listing(None, "loads", least=0)] = ()
     simulation: Simulation = Simulation()
+
+    @model_validator(mode="after")
+    def _check_steering(self) -> Self:
+        findings = Findings()
+        law = self.control and self.control.steering
+        if isinstance(law, PseudoInverse) and self.cluster.count < 3:
+            findings.add(
+                ("control", "steering", "law"),
+                "expected singularity_robust or none for fewer than three CMGs, got "
+                f"pseudo_inverse, which {self.cluster.count} leave without an inverse",
+            )
+        findings.raise_any()
+        return self
 
     @classmethod
     def from_yaml(cls, text: str, source: str = "<text>") -> Self:

@@ -27,6 +27,8 @@ from quietbus.spatial.rotation import (
 )
 
 PIECE = 1.0  # [s] integrated between two looks at the clock
+STEPS_PER_CALL = 4096  # at the most, so that a stiff run too can be watched and stopped
+SAME_INSTANT = 1e-9  # [s] instants closer than this are one
 
 
 @dataclass(frozen=True)
@@ -70,17 +72,18 @@ def integrate(
     tolerances = tolerances or Tolerances()
     count = int(np.floor(duration * output_rate * (1.0 + 1e-12))) + 1
     time = np.arange(count) / output_rate
+    finish = max(duration, time[-1])  # the last instant may lie a rounding past the duration
     # a power of two, so that output rates share compiled programs
-    size = max(64, 1 << int(np.ceil(PIECE * output_rate)).bit_length())
+    size = max(64, 1 << (int(np.ceil(PIECE * output_rate)) + 1).bit_length())
     store: list[np.ndarray] = []
     state, t, done = initial, 0.0, 0
     steps = rejected = 0
     step = 1e-4
     stopped, interrupted = None, False
     try:
-        while done < count or t < duration:
-            end = min(PIECE * round(t / PIECE + 1.0), duration)
-            last = count if end == duration else int(np.searchsorted(time, end))
+        while t < finish and not stopped:
+            end = _end_of_piece(t, finish)
+            last = np.searchsorted(time, end, side="right" if end == finish else "left")
             due = time[done:last]
             ts = np.full(size, end)
             ts[: len(due)] = due
@@ -94,12 +97,12 @@ def integrate(
             done += valid
             steps, rejected = steps + int(piece.steps), rejected + int(piece.rejected)
             stopped = _reason(piece)
-            if stopped:
-                break
-            state, t = piece.final, end
-            step = 0.9 * PIECE / max(int(piece.steps) - int(piece.rejected), 1)
-            if progress is not None:
-                progress(t)
+            if not stopped:
+                reached = float(piece.time_reached)
+                step = 0.9 * (reached - t) / max(int(piece.steps) - int(piece.rejected), 1)
+                state, t = piece.final, reached
+                if progress is not None:
+                    progress(t)
     except KeyboardInterrupt:
         stopped, interrupted = f"interrupted by the user at t = {t:g} s", True
     if not store:
@@ -109,14 +112,19 @@ def integrate(
     return DirectSolution(time[:done], kept, state, steps, rejected, stopped, interrupted)
 
 
+def _end_of_piece(t: float, finish: float) -> float:
+    """The next whole second, or the finish where little would be left after that."""
+    end = PIECE * (np.floor(t / PIECE + SAME_INSTANT) + 1.0)
+    return finish if end > finish - 1e-6 else float(end)
+
+
 class _Piece(eqx.Module):
     outputs: Outputs
     valid: Array  # which output instants were reached
     final: State
     time_reached: Float[Array, ""]
     margin: Float[Array, ""]
-    finite: Array
-    success: Array
+    sound: Array  # the end or the allowed number of steps was reached, with finite values
     steps: Array
     rejected: Array
 
@@ -143,7 +151,7 @@ def _compiled_piece(satellite, state, numbers, with_joint_forces) -> _Piece:
     controller = diffrax.PIDController(rtol=rtol, atol=atol, dtmin=1e-9, force_dtmin=False)
     corners = [load.profile.corners for load in satellite.loads]
     if sum(len(corner) for corner in corners):
-        jumps = jnp.sort(jnp.concatenate(corners))
+        jumps = _apart(jnp.sort(jnp.concatenate(corners)), t0, t1)
         controller = diffrax.ClipStepSizeController(controller, jump_ts=jumps)
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(rate),
@@ -156,11 +164,15 @@ def _compiled_piece(satellite, state, numbers, with_joint_forces) -> _Piece:
         stepsize_controller=controller,
         event=diffrax.Event(left_geometry),
         adjoint=diffrax.ForwardMode(),
-        max_steps=None,
+        max_steps=STEPS_PER_CALL,
         throw=False,
     )
     saved, (last,) = solution.ys
-    valid = jnp.all(jnp.isfinite(saved), axis=1)
+    time_reached = solution.ts[1][0]
+    valid = (ts <= time_reached) & jnp.all(jnp.isfinite(saved), axis=1)
+    ended = (solution.result == diffrax.RESULTS.successful) | (
+        solution.result == diffrax.RESULTS.max_steps_reached
+    )
     states = jax.vmap(unravel)(saved)
     reported = jax.vmap(lambda t, s: outputs(satellite, t, _tidy(satellite, s), with_joint_forces))
     final = _tidy(satellite, unravel(last))
@@ -168,13 +180,21 @@ def _compiled_piece(satellite, state, numbers, with_joint_forces) -> _Piece:
         outputs=reported(ts, states),
         valid=valid,
         final=final,
-        time_reached=solution.ts[1][0],
+        time_reached=time_reached,
         margin=geometry_margin(satellite, final),
-        finite=jnp.all(jnp.isfinite(last)),
-        success=solution.result == diffrax.RESULTS.successful,
+        sound=ended & jnp.all(jnp.isfinite(last)) & (time_reached > t0),
         steps=solution.stats["num_steps"],
         rejected=solution.stats["num_rejected_steps"],
     )
+
+
+def _apart(jumps, t0, t1):
+    """Sorted corners with those at one instant made equal, so that no step is vanishingly short."""
+    previous = jnp.concatenate([jnp.full(1, -jnp.inf), jumps[:-1]])
+    jumps = jnp.where(jumps - previous < SAME_INSTANT, previous, jumps)
+    for end in (t0, t1):
+        jumps = jnp.where(jnp.abs(jumps - end) < SAME_INSTANT, end, jumps)
+    return jumps
 
 
 def _tidy(satellite: Satellite, state: State) -> State:
@@ -200,7 +220,7 @@ def _tidy(satellite: Satellite, state: State) -> State:
 def _reason(piece: _Piece) -> str | None:
     """Why a piece ended before its time, in words for the user."""
     t = float(piece.time_reached)
-    if bool(piece.success) and bool(piece.finite):
+    if bool(piece.sound):
         return None
     where = (
         f"at t = {t:.6g} s, bus rate {_show(piece.final.w_NB_B)} rad/s, "
