@@ -1,8 +1,11 @@
 """The command line: what it writes, what it prints, how it ends."""
 
 import json
+import signal
 import subprocess
 import sys
+import tempfile
+import time
 
 import pytest
 
@@ -14,6 +17,8 @@ from quietbus import cli
 def command(monkeypatch, tmp_path, capsys):
     """Run a command in an empty folder; gives exit status, standard output and error."""
     monkeypatch.chdir(tmp_path)
+
+    monkeypatch.setattr(signal, "signal", lambda *_: None)  # pytest's own Ctrl-C stays
 
     def call(*arguments):
         monkeypatch.setattr(sys, "argv", ["quietbus", *arguments])
@@ -85,7 +90,10 @@ def test_init_writes_a_scenario_that_works_and_keeps_what_is_there(command, tmp_
         (["simulate", "zhang2012", "-o", "no/folder/run.nc"], "no/folder: no such folder"),
         (["simulate", "zhang2012", "--mount", "soft"], "soft"),
         (["simulate", "zhang2012", "--mount", "rigid", "--joint-forces"], "--joint-forces"),
+        (["simulate", "zhang2012", "-o", "."], ".: is a folder"),
+        (["simulate", "zhang2012", "-o", "/proc/run.nc"], "/proc/run.nc: cannot be written"),
         (["plot", "nothing.nc"], "nothing.nc: no such file"),
+        (["plot", "."], ".: is a folder"),
         (["plot", "nothing.nc", "--format", "bmp"], "expected png, svg or pdf, got 'bmp'"),
         (["validate", "zhang2012", "--export", "no/folder/m.xml"], "no/folder: no such folder"),
     ],
@@ -116,6 +124,38 @@ def test_run_that_diverges_keeps_what_it_has_and_ends_with_status_1(command, tmp
     assert status == 1
     assert "at t = " in err
     assert qb.load_run(tmp_path / "run.nc").attrs["status"] == "stopped"
+
+
+@pytest.mark.slow
+def test_ctrl_c_keeps_the_run_and_ends_with_status_1(tmp_path):
+    arguments = ["simulate", "zhang2012", "--duration", "3000 s", "-o", str(tmp_path / "run.nc")]
+    process = subprocess.Popen([sys.executable, "-m", "quietbus", *arguments])
+    time.sleep(12.0)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(timeout=120.0) == 1
+    run = qb.load_run(tmp_path / "run.nc")
+    assert run.attrs["status"] == "interrupted"
+    assert 0.0 < run.time[-1] < 2999.0
+
+
+def test_run_that_cannot_be_written_is_kept_elsewhere(command, tmp_path, monkeypatch):
+    from quietbus import results
+
+    write, refused = results.save_run, []
+
+    def full_disk(run, path):
+        if not refused:
+            refused.append(path)
+            raise OSError(28, "No space left on device")
+        write(run, path)
+
+    monkeypatch.setattr(results, "save_run", full_disk)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    status, _, err = command("simulate", short(tmp_path), "-o", "run.nc", "--mount", "rigid")
+    assert status == 1
+    assert "run.nc: cannot be written: No space left on device; the run is in" in err
+    refuge = err.split("the run is in ")[1].strip()
+    assert qb.load_run(refuge).attrs["status"] == "complete"
 
 
 def test_coarse_output_is_told(command, tmp_path):

@@ -165,6 +165,8 @@ def simulate(
         _save(run, output)
     if run.sizes["time"] > 1:
         _print(summary_table({chosen: summarize(run)}))
+    else:
+        print("one instant only, so there is no table")
     if run.attrs["status"] != "complete":
         _fail(f"the run is not complete: {run.attrs['stop_reason']}")
 
@@ -207,6 +209,8 @@ def compare(
         }
         save_figures(figures, output)
         print(f"wrote summary.json and {len(figures)} pictures to {output}/")
+    else:
+        print("one instant only, so there are no table and no pictures")
     if broken:
         _fail("not complete: " + "; ".join(broken))
 

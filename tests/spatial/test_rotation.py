@@ -1,4 +1,4 @@
-"""Quaternions, rotation vectors and Euler angles against SciPy, and their derivatives."""
+"""Quaternions and rotation vectors against SciPy, and their derivatives."""
 
 import jax
 import jax.numpy as jnp
@@ -18,11 +18,9 @@ QUATERNION = [
     "quaternion_to_matrix",
     "quaternion_multiply",
     "quaternion_conjugate",
-    "quaternion_to_euler",
     "quaternion_to_rotation_vector",
     "rotation_vector_to_quaternion",
     "rotation_vector_to_matrix",
-    "euler_to_quaternion",
     "attitude_error",
 ]
 jitted = {name: jax.jit(getattr(rotation, name)) for name in QUATERNION}
@@ -85,14 +83,6 @@ def test_rotation_vector_of_a_quaternion_is_the_shortest(q):
     for same in (q, -q):
         theta = jitted["quaternion_to_rotation_vector"](same)
         np.testing.assert_allclose(theta, expected, atol=1e-13)
-
-
-@quickly
-@given(st.tuples(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5), st.floats(-3.1, 3.1)).map(np.array))
-def test_euler_angles_are_roll_pitch_yaw_of_the_yaw_pitch_roll_sequence(angles):
-    q = jitted["euler_to_quaternion"](angles)
-    same_turn(q, Rotation.from_euler("ZYX", angles[::-1]))
-    np.testing.assert_allclose(jitted["quaternion_to_euler"](q), angles, atol=1e-12)
 
 
 @quickly

@@ -65,11 +65,6 @@ class Findings:
         kind = PydanticCustomError("scenario", "{text}", {"text": message})
         self._errors.append(InitErrorDetails(type=kind, loc=loc, input=None))
 
-    def include(self, path: Path, error: ValidationError) -> None:
-        """Take over the problems of a model that belongs at ``path``."""
-        for problem in found(error):
-            self.add((*path, *problem.path), problem.message)
-
     def raise_any(self) -> None:
         """Report what was noted to pydantic, which merges it with all else."""
         if self._errors:

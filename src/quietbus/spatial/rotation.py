@@ -1,4 +1,4 @@
-"""Rotation matrices, unit quaternions and Euler angles.
+"""Rotation matrices, unit quaternions and rotation vectors.
 
 Quaternions are Hamilton's, scalar first; ``q_NB`` stands for ``R_NB``, the matrix that takes
 components in frame B to components in frame N (docs/notation.md).
@@ -75,31 +75,6 @@ def attitude_error(q_NR: Float[Array, "4"], q_NB: Float[Array, "4"]) -> Float[Ar
     """Twice the vector part of the shortest turn from reference R to body B [rad], in B."""
     q_RB = quaternion_multiply(quaternion_conjugate(q_NR), q_NB)
     return 2.0 * jnp.where(q_RB[0] < 0.0, -1.0, 1.0) * q_RB[1:]
-
-
-def euler_to_quaternion(angles: Float[Array, "3"]) -> Float[Array, "4"]:
-    """Quaternion of [roll, pitch, yaw] [rad] in the 3-2-1 (yaw, pitch, roll) sequence."""
-    (cr, cp, cy), (sr, sp, sy) = jnp.cos(0.5 * angles), jnp.sin(0.5 * angles)
-    return jnp.array(
-        [
-            cr * cp * cy + sr * sp * sy,
-            sr * cp * cy - cr * sp * sy,
-            cr * sp * cy + sr * cp * sy,
-            cr * cp * sy - sr * sp * cy,
-        ]
-    )
-
-
-def quaternion_to_euler(q: Float[Array, "4"]) -> Float[Array, "3"]:
-    """[roll, pitch, yaw] [rad] of a unit quaternion in the 3-2-1 sequence."""
-    w, x, y, z = q
-    return jnp.array(
-        [
-            jnp.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
-            jnp.arcsin(jnp.clip(2 * (w * y - x * z), -1.0, 1.0)),
-            jnp.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
-        ]
-    )
 
 
 def quaternion_to_rotation_vector(q: Float[Array, "4"]) -> Float[Array, "3"]:
