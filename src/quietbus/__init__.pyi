@@ -12,3 +12,5 @@ from .results import summarize as summarize
 from .scenario import Scenario as Scenario
 from .scenario import ScenarioError as ScenarioError
 from .scenario import load_scenario as load_scenario
+
+__version__: str
