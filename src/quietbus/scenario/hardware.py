@@ -140,6 +140,7 @@ class Isolator(Part):
             )
         findings.raise_any()
         directions = (upper - lower) / lengths[:, None]
+        repeated = False
         for leg, (s, k) in enumerate(zip(directions, self.legs.universal_axes, strict=True)):
             if abs(s @ np.array(k)) > 0.999:
                 findings.add(
@@ -150,12 +151,13 @@ class Isolator(Part):
             for other in range(leg):
                 same = [abs(ends[leg] - ends[other]).max() < 1e-9 for ends in (lower, upper)]
                 if all(same):
+                    repeated = True
                     findings.add(
                         ("legs", "upper_joints", leg),
                         f"leg {leg} is leg {other} again: upper and lower joint are the same",
                     )
         free = free_directions(lower, upper)
-        if free:
+        if free and not repeated:  # a repeated leg is the likely cause, and is told
             findings.add(
                 ("legs",),
                 f"expected legs that hold the plate in all six directions; these {len(lower)} "
