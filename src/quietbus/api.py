@@ -62,6 +62,7 @@ def simulate(
         ScenarioError: the scenario is not valid.
         ValueError: an unknown method or mount.
         SimulationError: the run diverged; what was computed until then is in its ``run``.
+        KeyboardInterrupt: Ctrl-C before anything was computed.
     """
     if method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}; got {method!r}")

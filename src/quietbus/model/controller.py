@@ -13,7 +13,8 @@ class PIDController(eqx.Module):
 
     e is twice the vector part of the shortest error quaternion. T_delivered is T cut by the
     torque limit and by the gimbals' rate limit; where neither acts, dq/dt = e exactly.
-    ``T_t = sqrt(Kd / Ki)`` is Astrom's tracking time sqrt(Ti Td).
+    ``T_t = sqrt(Kd / Ki)`` is Astrom's tracking time sqrt(Ti Td); with Ki or Kd zero nothing is
+    unwound. Limits of the gimbals' acceleration do not count as cuts.
     """
 
     kp: Float[Array, ""]  # [N m/rad]
