@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import resample_poly
 
+from quietbus.analysis.spectrum import detrended
+
 RESOLVING = 2.56  # samples per period that a line needs to be seen, the practice of vibration test
 FINER = 8  # band-limited interpolation for the peak, which seldom falls on a sample
 
@@ -46,19 +48,16 @@ def residual(time: np.ndarray, signal: np.ndarray, window: float = 1.0) -> Resid
             "a residual needs 8"
         )
     t, values = time[last], signal[last]
-    x = 2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0
-    basis = np.polynomial.legendre.legvander(x, 3)
-    weight = np.cos(0.5 * np.pi * x)[:, None]  # of the amplitude; its square is Hann's window
-    fit = np.linalg.lstsq(weight * basis, weight * values, rcond=None)[0]
-    middle = np.abs(x) <= 0.5
-    jitter = values - basis @ fit
+    jitter = detrended(t, values)
+    slow = values - jitter
+    middle = np.abs(np.linspace(-1.0, 1.0, len(t))) <= 0.5
     fine = resample_poly(jitter, FINER, 1)[: FINER * (len(t) - 1) + 1]
     between = np.abs(np.linspace(-1.0, 1.0, len(fine))) <= 0.5
     return Residual(
         window=(float(t[middle][0]), float(t[middle][-1])),
         jitter_peak=np.max(np.abs(fine[between]), axis=0),
         jitter_rms=np.sqrt(np.mean(jitter[middle] ** 2, axis=0)),
-        slow=np.max(np.abs(basis[middle] @ fit), axis=0),
+        slow=np.max(np.abs(slow[middle]), axis=0),
     )
 
 
