@@ -92,6 +92,8 @@ def test_init_writes_a_scenario_that_works_and_keeps_what_is_there(command, tmp_
         (["simulate", "zhang2012", "--mount", "rigid", "--joint-forces"], "--joint-forces"),
         (["simulate", "zhang2012", "-o", "."], ".: is a folder"),
         (["simulate", "zhang2012", "-o", "/proc/run.nc"], "/proc/run.nc: cannot be written"),
+        (["compare", "zhang2012", "-o", "/proc/none"], "/proc/none: cannot be made"),
+        (["compare", "zhang2012", "-o", "/proc"], "/proc: cannot be written"),
         (["plot", "nothing.nc"], "nothing.nc: no such file"),
         (["plot", "."], ".: is a folder"),
         (["plot", "nothing.nc", "--format", "bmp"], "expected png, svg or pdf, got 'bmp'"),
@@ -156,6 +158,12 @@ def test_run_that_cannot_be_written_is_kept_elsewhere(command, tmp_path, monkeyp
     assert "run.nc: cannot be written: No space left on device; the run is in" in err
     refuge = err.split("the run is in ")[1].strip()
     assert qb.load_run(refuge).attrs["status"] == "complete"
+    refused.clear()
+    status, _, err = command("compare", short(tmp_path), "-o", "both")
+    assert status == 1
+    refuge = err.split("isolated.nc: cannot be written: No space left on device; the run is in ")[1]
+    assert qb.load_run(refuge.strip()).attrs["mount"] == "isolated"
+    assert qb.load_run(tmp_path / "both" / "rigid.nc").attrs["mount"] == "rigid"
 
 
 def test_coarse_output_is_told(command, tmp_path):

@@ -160,15 +160,15 @@ def simulate(
                 )
             except api.SimulationError as error:
                 run = error.run
-            except KeyboardInterrupt:
-                _fail("interrupted before anything was computed; nothing to keep")
-        _save(run, output)
+        troubles = _save(run, output)
     if run.sizes["time"] > 1:
         _print(summary_table({chosen: summarize(run)}))
     else:
         print("one instant only, so there is no table")
     if run.attrs["status"] != "complete":
-        _fail(f"the run is not complete: {run.attrs['stop_reason']}")
+        troubles.append(f"the run is not complete: {run.attrs['stop_reason']}")
+    if troubles:
+        _fail("; ".join(troubles))
 
 
 @app.command()
@@ -188,13 +188,12 @@ def compare(
 
     with _keeping_results():
         with _progress(dict.fromkeys(Mount, checked.simulation.duration)) as tell, _notes():
-            try:
-                runs = api.compare(checked, progress=tell)
-            except KeyboardInterrupt:
-                _fail("interrupted before both runs had begun; nothing to keep")
+            runs = api.compare(checked, progress=tell)
+        troubles = []
         for mount, run in runs.items():
-            _save(run, output / f"{mount}.nc")
-    broken = [f"{m}: {r.attrs['stop_reason']}" for m, r in runs.items() if r.attrs["stop_reason"]]
+            troubles += _save(run, output / f"{mount}.nc")
+            if run.attrs["status"] != "complete":
+                troubles.append(f"the {mount} run is not complete: {run.attrs['stop_reason']}")
     if _Stop.asked:
         print(f"no pictures of an interrupted comparison; `quietbus plot {output}/isolated.nc`")
     elif all(run.sizes["time"] > 1 for run in runs.values()):
@@ -211,8 +210,8 @@ def compare(
         print(f"wrote summary.json and {len(figures)} pictures to {output}/")
     else:
         print("one instant only, so there are no table and no pictures")
-    if broken:
-        _fail("not complete: " + "; ".join(broken))
+    if troubles:
+        _fail("; ".join(troubles))
 
 
 @app.command()
@@ -399,8 +398,11 @@ def _notes() -> Iterator[None]:
             print(f"note: {warning.message}", file=sys.stderr)
 
 
-def _save(run: xr.Dataset, output: Path) -> None:
-    """Write a run; where that fails, to the folder for temporary files, so that it is not lost."""
+def _save(run: xr.Dataset, output: Path) -> list[str]:
+    """Write a run; where that fails, to the folder for temporary files, so that it is not lost.
+
+    What went wrong, for the user, or nothing.
+    """
     from quietbus.results import save_run
 
     try:
@@ -408,8 +410,9 @@ def _save(run: xr.Dataset, output: Path) -> None:
     except OSError as error:
         refuge = Path(tempfile.mkdtemp(prefix="quietbus-")) / output.name
         save_run(run, refuge)
-        _fail(f"{output}: cannot be written: {error.strerror or error}; the run is in {refuge}")
+        return [f"{output}: cannot be written: {error.strerror or error}; the run is in {refuge}"]
     print(f"wrote {output}")
+    return []
 
 
 def _check_folder(folder: Path) -> None:
@@ -422,11 +425,7 @@ def _check_file(file: Path) -> None:
     _check_folder(file.parent)
     if file.is_dir():
         raise _BadInput(f"{file}: is a folder; expected the name of a file")
-    try:
-        with tempfile.TemporaryFile(dir=file.parent):
-            pass
-    except OSError as error:
-        raise _BadInput(f"{file}: cannot be written: {error.strerror or error}") from None
+    _check_writable(file.parent, file)
 
 
 def _make_folder(folder: Path) -> None:
@@ -434,6 +433,15 @@ def _make_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise _BadInput(f"{folder}: cannot be made: {error.strerror}") from None
+    _check_writable(folder, folder)
+
+
+def _check_writable(folder: Path, wanted: Path) -> None:
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise _BadInput(f"{wanted}: cannot be written: {error.strerror or error}") from None
 
 
 def _fail(message: str) -> NoReturn:

@@ -30,6 +30,7 @@ from quietbus.analysis.modes import Mode, fixed_base_modes, free_modes
 from quietbus.analysis.transmissibility import Places, Transmissibility, transmissibility
 from quietbus.build import build_satellite
 from quietbus.dynamics.linearize import (
+    AXES,
     Actuator,
     LinearModel,
     OperatingPoint,
@@ -38,10 +39,9 @@ from quietbus.dynamics.linearize import (
     platform_inertia,
 )
 from quietbus.model.satellite import Satellite
+from quietbus.model.variants import without_friction, without_leg_mass, without_rotation
 from quietbus.scenario import Scenario
 from quietbus.spatial.rotation import quaternion_to_matrix
-
-AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ class Study:
     @cached_property
     def truth(self) -> list[dict[str, Any]] | None:
         """What the per-axis analysis says, and what is so: one simplification lifted at a time."""
-        if self.pid is None or self.loop_analyses is None:
+        if self.pid is None or self.loop_analyses is None or self.coupled is None:
             return None
         rows: list[dict[str, Any]] = [
             {
@@ -174,31 +174,31 @@ class Study:
         still = without_rotation(self.satellite)
         light = without_leg_mass(still)
         bare = without_friction(light)
-        cases: list[tuple[str, Satellite, Actuator]] = [
-            (
-                "free bus, all axes, platform at the height of its mass centre",
-                at_height(bare, 0.0),
-                "ideal",
-            ),
-            ("the same, platform where it is", bare, "ideal"),
-            ("with joint friction", light, "ideal"),
-            ("with leg mass", still, "ideal"),
-            ("with rotor momentum", self.satellite, "ideal"),
-        ]
+        steps = {
+            "free bus, all axes, platform at the height of its mass centre": at_height(bare, 0.0),
+            "the same, platform where it is": bare,
+            "with joint friction": light,
+            "with leg mass": still,
+        }
         if self.satellite.steering is not None:
-            cases.append(("with gimbal servo: all", self.satellite, "servo"))
-        for case, satellite, actuator in cases:
-            result = analyze_coupled(
-                controlled(linearize(satellite, self.point, actuator), self.pid)
-            )
-            rows.append(
-                {
-                    "case": case,
-                    "stable_gain_range": result.stable_gain_range,
-                    "gain_margins_db": result.gain_margins_db,
-                    "disk_margin": result.disk_margin,
-                }
-            )
+            steps["with rotor momentum"] = self.satellite
+        results = {
+            case: analyze_coupled(controlled(linearize(satellite, self.point, "ideal"), self.pid))
+            for case, satellite in steps.items()
+        }
+        last = (
+            "with rotor momentum" if self.satellite.steering is None else "with gimbal servo: all"
+        )
+        results[last] = self.coupled
+        rows += [
+            {
+                "case": case,
+                "stable_gain_range": result.stable_gain_range,
+                "gain_margins_db": result.gain_margins_db,
+                "disk_margin": result.disk_margin,
+            }
+            for case, result in results.items()
+        ]
         return rows
 
     @cached_property
@@ -279,28 +279,6 @@ class Study:
                 },
             }
         )
-
-
-def without_leg_mass(satellite: Satellite) -> Satellite:
-    """The satellite with massless legs."""
-    masses = lambda s: [  # noqa: E731
-        getattr(part, name)
-        for part in (s.legs.upper, s.legs.lower)
-        for name in ("mass", "transverse_inertia", "axial_inertia")
-    ]
-    return eqx.tree_at(masses, satellite, [0.0 * value for value in masses(satellite)])
-
-
-def without_rotation(satellite: Satellite) -> Satellite:
-    """The satellite with its rotors at a standstill."""
-    speed = lambda s: s.cluster.rotor_speed  # noqa: E731
-    return eqx.tree_at(speed, satellite, 0.0 * speed(satellite))
-
-
-def without_friction(satellite: Satellite) -> Satellite:
-    """The satellite with joints that turn freely."""
-    joints = lambda s: (s.legs.spherical_friction, s.legs.universal_friction)  # noqa: E731
-    return eqx.tree_at(joints, satellite, tuple(0.0 * value for value in joints(satellite)))
 
 
 def at_height(satellite: Satellite, height: float) -> Satellite:

@@ -20,12 +20,15 @@ NOISE = 1e-10  # [deg/s] jitter that is the integrator's; a ratio to it says not
 Ranges = tuple[tuple[float, float | None], ...]
 
 
+def _titled(title: str) -> Table:
+    return Table(title=title, box=SIMPLE_HEAD, title_justify="left")
+
+
 def summary_table(summaries: Mapping[str, Summary]) -> Table:
     """The numbers of one run, or of two side by side with their ratio."""
     both = len(summaries) == 2
     first = next(iter(summaries.values()))
-    table = Table(title=f"Residual motion {first.residual_note}", box=SIMPLE_HEAD)
-    table.title_justify = "left"
+    table = _titled(f"Residual motion {first.residual_note}")
     table.add_column("")
     table.add_column("unit")
     for mount in summaries:
@@ -63,8 +66,7 @@ def _degrees(vector: Sequence[float] | None, i: int) -> float:
 
 def checks_table(name: str, checks: Sequence[Check]) -> Table:
     """Errors, bounds and verdicts of a validation."""
-    table = Table(title=f"{name}: quietbus against MuJoCo", box=SIMPLE_HEAD)
-    table.title_justify = "left"
+    table = _titled(f"{name}: quietbus against MuJoCo")
     table.add_column("check")
     table.add_column("error", justify="right")
     table.add_column("bound", justify="right")
@@ -107,7 +109,7 @@ def range_text(ranges: Ranges) -> str:
 
 def _table(title: str, *columns: str) -> Table:
     """The first column holds names, the others numbers."""
-    table = Table(title=title, box=SIMPLE_HEAD, title_justify="left")
+    table = _titled(title)
     for i, column in enumerate(columns):
         table.add_column(column, justify="right" if i else "left", overflow="fold")
     return table

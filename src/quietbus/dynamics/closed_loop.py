@@ -145,18 +145,23 @@ def initial_state(
     gimbal_angle: Float[Array, " cmg"],
 ) -> State:
     """Plate and bus moving as one, the plate in its nominal pose, bus mass centre at rest at 0."""
-    R_NB = quaternion_to_matrix(q_NB)
-    zero = jnp.zeros(3)
-    return State(
-        p_NB_N=zero,
-        q_NB=q_NB,
-        p_NP_N=R_NB @ satellite.p_BP_B,
-        q_NP=quaternion_multiply(q_NB, satellite.q_BP),
-        v_NB_N=zero,
-        w_NB_B=w_NB_B,
-        v_NP_N=R_NB @ jnp.cross(w_NB_B, satellite.p_BP_B),
-        w_NP_P=quaternion_to_matrix(satellite.q_BP).T @ w_NB_B,
-        gimbal_angle=gimbal_angle,
-        gimbal_rate=jnp.zeros_like(gimbal_angle),
-        error_integral=zero,
+    zero, none = jnp.zeros(3), jnp.zeros(4)
+    state = State(
+        zero, q_NB, zero, none, zero, w_NB_B, zero, zero, gimbal_angle, 0.0 * gimbal_angle, zero
+    )
+    return with_plate_on_bus(satellite, state)
+
+
+def with_plate_on_bus(satellite: Satellite, state: State) -> State:
+    """The state with the plate in its nominal pose, moving with the bus as one body."""
+    R_NB = quaternion_to_matrix(state.q_NB)
+    return eqx.tree_at(
+        lambda s: (s.p_NP_N, s.q_NP, s.v_NP_N, s.w_NP_P),
+        state,
+        (
+            state.p_NB_N + R_NB @ satellite.p_BP_B,
+            quaternion_multiply(state.q_NB, satellite.q_BP),
+            state.v_NB_N + R_NB @ jnp.cross(state.w_NB_B, satellite.p_BP_B),
+            quaternion_to_matrix(satellite.q_BP).T @ state.w_NB_B,
+        ),
     )

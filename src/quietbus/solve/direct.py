@@ -15,16 +15,12 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float
 
-from quietbus.dynamics.closed_loop import state_rate
+from quietbus.dynamics.closed_loop import state_rate, with_plate_on_bus
 from quietbus.dynamics.outputs import Outputs, geometry_margin, outputs
 from quietbus.dynamics.state import State
 from quietbus.model.cmg import ClusterMoments
 from quietbus.model.satellite import Satellite
-from quietbus.spatial.rotation import (
-    quaternion_multiply,
-    quaternion_normalize,
-    quaternion_to_matrix,
-)
+from quietbus.spatial.rotation import quaternion_normalize
 
 PIECE = 1.0  # [s] integrated between two looks at the clock
 STEPS_PER_CALL = 4096  # at the most, so that a stiff run too can be watched and stopped
@@ -202,19 +198,10 @@ def _tidy(satellite: Satellite, state: State) -> State:
 
     Both hold exactly in the equations; this removes the integrator's drift.
     """
-    q_NB, q_NP = quaternion_normalize(state.q_NB), quaternion_normalize(state.q_NP)
-    p_NP_N, v_NP_N, w_NP_P = state.p_NP_N, state.v_NP_N, state.w_NP_P
-    if satellite.mount == "rigid":
-        R_NB = quaternion_to_matrix(q_NB)
-        q_NP = quaternion_multiply(q_NB, satellite.q_BP)
-        p_NP_N = state.p_NB_N + R_NB @ satellite.p_BP_B
-        v_NP_N = state.v_NB_N + R_NB @ jnp.cross(state.w_NB_B, satellite.p_BP_B)
-        w_NP_P = quaternion_to_matrix(satellite.q_BP).T @ state.w_NB_B
-    return eqx.tree_at(
-        lambda s: (s.q_NB, s.p_NP_N, s.q_NP, s.v_NP_N, s.w_NP_P),
-        state,
-        (q_NB, p_NP_N, q_NP, v_NP_N, w_NP_P),
-    )
+    attitudes = lambda s: (s.q_NB, s.q_NP)  # noqa: E731
+    unit = tuple(quaternion_normalize(q) for q in attitudes(state))
+    state = eqx.tree_at(attitudes, state, unit)
+    return with_plate_on_bus(satellite, state) if satellite.mount == "rigid" else state
 
 
 def _reason(piece: _Piece) -> str | None:

@@ -23,6 +23,7 @@ from quietbus.dynamics.invariants import (
 )
 from quietbus.dynamics.state import State
 from quietbus.model.satellite import Satellite
+from quietbus.model.variants import without_friction, without_rotation
 from quietbus.validate.reference import Reference
 from quietbus.validate.states import kicked_state, random_state, random_wrench
 from quietbus.validate.trajectory import (
@@ -172,15 +173,9 @@ def check_energy(satellite: Satellite, state: State, times: np.ndarray) -> Check
 
 def lossless(satellite: Satellite) -> Satellite:
     """The satellite without damping, friction, loads and control, its rotors stopped."""
-    legs, cluster = satellite.legs, satellite.cluster
-    legs = replace(
-        legs,
-        damping=jnp.zeros_like(legs.damping),
-        spherical_friction=jnp.zeros_like(legs.spherical_friction),
-        universal_friction=jnp.zeros_like(legs.universal_friction),
-    )
-    cluster = replace(cluster, rotor_speed=jnp.zeros_like(cluster.rotor_speed))
-    return held_gimbals(replace(satellite, legs=legs, cluster=cluster), Wrench.zero())
+    undamped = replace(satellite.legs, damping=jnp.zeros_like(satellite.legs.damping))
+    still = without_rotation(without_friction(replace(satellite, legs=undamped)))
+    return held_gimbals(still, Wrench.zero())
 
 
 def over_time(

@@ -22,6 +22,7 @@ from quietbus.dynamics.state import State
 from quietbus.model.cmg import ClusterMoments
 from quietbus.model.load import Constant, Load
 from quietbus.model.satellite import Satellite
+from quietbus.model.variants import without_friction, without_leg_mass
 from quietbus.spatial.inertia import point_inertia
 from quietbus.validate.engine import import_mujoco
 from quietbus.validate.mjcf import nominal_spans_B, write_mjcf
@@ -29,13 +30,7 @@ from quietbus.validate.mjcf import nominal_spans_B, write_mjcf
 
 def massless_legs(satellite: Satellite) -> Satellite:
     """The satellite with struts only: legs without mass, inertia and joint friction."""
-    legs = satellite.legs
-    parts = (legs.upper, legs.lower, legs.spherical_friction, legs.universal_friction)
-    upper, lower, spherical, universal = jax.tree.map(jnp.zeros_like, parts)
-    massless = replace(
-        legs, upper=upper, lower=lower, spherical_friction=spherical, universal_friction=universal
-    )
-    return replace(satellite, legs=massless)
+    return without_friction(without_leg_mass(satellite))
 
 
 def held_gimbals(satellite: Satellite, wrench: Wrench) -> Satellite:

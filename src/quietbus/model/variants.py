@@ -1,0 +1,27 @@
+"""A satellite with something taken out of it, for checks and for "what if"."""
+
+import equinox as eqx
+
+from quietbus.model.satellite import Satellite
+
+
+def without_leg_mass(satellite: Satellite) -> Satellite:
+    """The satellite with massless legs."""
+    masses = lambda s: [  # noqa: E731
+        getattr(part, name)
+        for part in (s.legs.upper, s.legs.lower)
+        for name in ("mass", "transverse_inertia", "axial_inertia")
+    ]
+    return eqx.tree_at(masses, satellite, [0.0 * value for value in masses(satellite)])
+
+
+def without_friction(satellite: Satellite) -> Satellite:
+    """The satellite with joints that turn freely."""
+    joints = lambda s: (s.legs.spherical_friction, s.legs.universal_friction)  # noqa: E731
+    return eqx.tree_at(joints, satellite, tuple(0.0 * value for value in joints(satellite)))
+
+
+def without_rotation(satellite: Satellite) -> Satellite:
+    """The satellite with its rotors at a standstill."""
+    speed = lambda s: s.cluster.rotor_speed  # noqa: E731
+    return eqx.tree_at(speed, satellite, 0.0 * speed(satellite))
