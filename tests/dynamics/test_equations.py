@@ -14,7 +14,7 @@ from scipy.linalg import eigh
 
 from oracles.satellites import awkward_satellite, paper_satellite
 from quietbus.dynamics.closed_loop import external_wrench, initial_state, rotor_angles, state_rate
-from quietbus.dynamics.equations import Accelerations, Wrench
+from quietbus.dynamics.equations import Accelerations, Wrench, plate_motion
 from quietbus.dynamics.invariants import body_motions, joint_motion, kinetic_energy
 from quietbus.dynamics.joint_forces import joint_forces
 from quietbus.model.load import Constant, Load
@@ -413,7 +413,7 @@ def balances(satellite, state, rate):
 
 def joint_case(seed):
     satellite, state = controlled("isolated", seed)
-    wrench = external_wrench(satellite, T0, state)
+    wrench = external_wrench(satellite, T0, plate_motion(state))
     R_NB, R_NP = quaternion_to_matrix(state.q_NB), quaternion_to_matrix(state.q_NP)
     p_U = np.asarray(state.p_NP_N + satellite.legs.p_PU_P @ R_NP.T)
     p_A = np.asarray(state.p_NB_N + satellite.legs.p_BA_B @ R_NB.T)

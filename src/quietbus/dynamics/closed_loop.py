@@ -5,7 +5,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from quietbus.dynamics.equations import Accelerations, Wrench, accelerations
+from quietbus.dynamics.equations import Accelerations, Wrench, accelerations, plate_motion
+from quietbus.dynamics.kinematics import PlateMotion
 from quietbus.dynamics.state import State
 from quietbus.model.cmg import ClusterMoments, ControlMomentGyro
 from quietbus.model.satellite import Satellite
@@ -85,9 +86,9 @@ def control_signals(satellite: Satellite, t: Float[Array, ""], state: State) -> 
     )
 
 
-def external_wrench(satellite: Satellite, t: Float[Array, ""], state: State) -> Wrench:
+def external_wrench(satellite: Satellite, t: Float[Array, ""], plates: PlateMotion) -> Wrench:
     """Sum of all external loads at time t [s]."""
-    attitude = {"bus": quaternion_to_matrix(state.q_NB), "plate": quaternion_to_matrix(state.q_NP)}
+    attitude = {"bus": plates.R_NB, "plate": plates.R_NP}
     total = Wrench.zero()
     for load in satellite.loads:
         force, torque = load.wrench(t, attitude[load.body])
@@ -107,7 +108,7 @@ def evaluate(
     """Control decisions and accelerations at time t [s]; rotor angles as given or those of t."""
     phi = rotor_angles(satellite, t) if rotor_angle is None else rotor_angle
     signals = control_signals(satellite, t, state)
-    wrench = external_wrench(satellite, t, state)
+    wrench = external_wrench(satellite, t, plate_motion(state))
     return signals, accelerations(
         satellite, state, phi, signals.gimbal_acceleration, wrench, moments
     )

@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 from quietbus.dynamics.kinematics import PlateMotion, leg_motion
 from quietbus.dynamics.legs import leg_forces, leg_mass_matrix
 from quietbus.dynamics.state import State
-from quietbus.model.cmg import ClusterMoments
+from quietbus.model.cmg import CarriedMotion, ClusterMoments
 from quietbus.model.satellite import Satellite
 from quietbus.spatial.inertia import point_inertia
 from quietbus.spatial.rotation import quaternion_to_matrix, skew
@@ -32,6 +32,11 @@ class Wrench(eqx.Module):
     def zero(cls) -> "Wrench":
         """No load."""
         return cls(*jnp.zeros((4, 3)))
+
+    @property
+    def on_speeds(self) -> Float[Array, "12"]:
+        """Generalised force on the twelve speeds."""
+        return jnp.concatenate([self.force_P, self.torque_P, self.force_B, self.torque_B])
 
 
 class Accelerations(eqx.Module):
@@ -76,18 +81,13 @@ def accelerations(
     if moments is None:
         moments = ClusterMoments.expand(satellite.cluster)
     plates = plate_motion(state)
-    legs = leg_motion(satellite.legs, plates)
     carried = moments.at(state.gimbal_angle, rotor_angle, state.gimbal_rate, gimbal_acceleration)
-    M_P, f_P = _plate(satellite, plates, carried)
-    M_B, f_B = _bus(satellite, plates)
-    zero = jnp.zeros((6, 6))
-    M = leg_mass_matrix(satellite.legs, legs) + jnp.block([[M_P, zero], [zero, M_B]])
-    loads = jnp.concatenate([wrench.force_P, wrench.torque_P, wrench.force_B, wrench.torque_B])
-    f = leg_forces(satellite.legs, legs, plates) + jnp.concatenate([f_P, f_B]) + loads
+    M, f = mass_and_force(satellite, plates, carried)
+    f = f + wrench.on_speeds
     if satellite.mount == "rigid":
         # v_P = v_B + w_B x r and w_P = w_B: the same twelve equations on six speeds
-        r, w_B = rotate(plates.R_NB, satellite.p_BP_B), plates.w_B
-        T = jnp.block([[jnp.eye(3), -skew(r)], [jnp.zeros((3, 3)), jnp.eye(3)], [jnp.eye(6)]])
+        T, w_B = rigid_speeds(satellite, plates), plates.w_B
+        r = rotate(plates.R_NB, satellite.p_BP_B)
         bias = jnp.zeros(12).at[:3].set(cross(w_B, cross(w_B, r)))
         u_rate = T @ solve_positive_definite(T.T @ M @ T, T.T @ (f - M @ bias)) + bias
     else:
@@ -95,19 +95,54 @@ def accelerations(
     return Accelerations(*u_rate.reshape(4, 3))
 
 
-def _plate(satellite, plates, carried):
-    """Mass matrix and force of the plate and all it carries, on (v_P, w_P)."""
+def mass_and_force(
+    satellite: Satellite, plates: PlateMotion, carried: CarriedMotion
+) -> tuple[Float[Array, "12 12"], Float[Array, "12"]]:
+    """Mass matrix M and force f of ``M du/dt = f``, external loads left out."""
+    legs = leg_motion(satellite.legs, plates)
+    M_P, f_P = plate_mass_and_force(plates, _with_plate(satellite, carried))
+    M_B, f_B = _bus(satellite, plates)
+    zero = jnp.zeros((6, 6))
+    M = leg_mass_matrix(satellite.legs, legs) + jnp.block([[M_P, zero], [zero, M_B]])
+    return M, leg_forces(satellite.legs, legs, plates) + jnp.concatenate([f_P, f_B])
+
+
+def rigid_speeds(satellite: Satellite, plates: PlateMotion) -> Float[Array, "12 6"]:
+    """The twelve speeds by those of the bus (v_B, w_B), where both plates are one body."""
+    r = rotate(plates.R_NB, satellite.p_BP_B)
+    return jnp.block([[jnp.eye(3), -skew(r)], [jnp.zeros((3, 3)), jnp.eye(3)], [jnp.eye(6)]])
+
+
+def _with_plate(satellite, carried):
+    """The moments of the plate and all it carries."""
     plate = satellite.plate
-    mass = carried.mass + plate.mass
-    c = carried.c + plate.mass * plate.p_PPcm_P
-    J = carried.J + plate.I_PPcm_P + point_inertia(plate.mass, plate.p_PPcm_P)
+    return eqx.tree_at(
+        lambda moments: (moments.mass, moments.c, moments.J),
+        carried,
+        (
+            carried.mass + plate.mass,
+            carried.c + plate.mass * plate.p_PPcm_P,
+            carried.J + plate.I_PPcm_P + point_inertia(plate.mass, plate.p_PPcm_P),
+        ),
+    )
+
+
+def plate_mass_and_force(
+    plates: PlateMotion, carried: CarriedMotion
+) -> tuple[Float[Array, "6 6"], Float[Array, "6"]]:
+    """Mass matrix and force, on (v_P, w_P), of mass moments that the plate carries.
+
+    Both are linear in the moments.
+    """
     R = plates.R_NP
     w = rotate(R.T, plates.w_P)
     # d/dt of (m v + w x c + p, c x v + J w + H) at dv/dt = dw/dt = 0; rates are taken in the plate
-    force = -(cross(w, cross(w, c) + 2.0 * carried.p) + carried.p_rate)
-    torque = -(rotate(carried.J_rate, w) + cross(w, rotate(J, w) + carried.H) + carried.H_rate)
-    c_skew = skew(rotate(R, c))
-    M = jnp.block([[mass * jnp.eye(3), -c_skew], [c_skew, R @ J @ R.T]])
+    force = -(cross(w, cross(w, carried.c) + 2.0 * carried.p) + carried.p_rate)
+    torque = -(
+        rotate(carried.J_rate, w) + cross(w, rotate(carried.J, w) + carried.H) + carried.H_rate
+    )
+    c_skew = skew(rotate(R, carried.c))
+    M = jnp.block([[carried.mass * jnp.eye(3), -c_skew], [c_skew, R @ carried.J @ R.T]])
     return M, jnp.concatenate([rotate(R, force), rotate(R, torque)])
 
 

@@ -190,7 +190,45 @@ class ClusterMoments(eqx.Module):
             H_rate=b1_[3:] + H_gimbal_rate,
         )
 
+    def orders(
+        self,
+        gamma: Float[Array, " cmg"],
+        gamma_rate: Float[Array, " cmg"],
+        gamma_acceleration: Float[Array, " cmg"],
+    ) -> CarriedMotion:
+        """Complex amplitudes of the moments at each order of each rotor, axes (cmg, order, ...).
 
+        The moments are ``averaged().at(...)`` plus the real part of the sum over units and orders
+        h of ``amplitude * exp(i h phi)``. Arguments as of ``at``.
+        """
+
+        def unit(c_H, J, H_gimbal, speed, *gimbal):
+            def order(h):
+                rotating = [
+                    k.at[..., : 2 * h - 1].set(0).at[..., 2 * h + 1 :].set(0)
+                    for k in (c_H[:, None], J[:, None], H_gimbal[:, None])
+                ]
+                part = ClusterMoments(jnp.zeros(()), speed[None], *rotating)
+                gamma, rate, acceleration = (value[None] for value in gimbal)
+                quarter = jnp.full(1, 0.5 * np.pi / h)
+                cosine = part.at(gamma, jnp.zeros(1), rate, acceleration)
+                sine = part.at(gamma, quarter, rate, acceleration)
+                return jax.tree.map(lambda a, b: a - 1j * b, cosine, sine)
+
+            return jax.tree.map(lambda *each: jnp.stack(each), *(order(h) for h in ORDERS))
+
+        return jax.vmap(unit, (1, 1, 1, 0, 0, 0, 0))(
+            self.c_H,
+            self.J,
+            self.H_gimbal,
+            self.rotor_speed,
+            gamma,
+            gamma_rate,
+            gamma_acceleration,
+        )
+
+
+ORDERS = (1, 2)  # of a rigid rotor's mass moments
 _PAIRS = (np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2]))  # of a symmetric matrix
 _SYMMETRIC = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])
 _SAMPLES = 2.0 * np.pi / 5.0 * np.arange(5)
