@@ -16,7 +16,7 @@ from quietbus.dynamics.linearize import Actuator, LinearModel, OperatingPoint
 from quietbus.dynamics.linearize import linearize as linearize_satellite
 from quietbus.results import aliasing, to_dataset
 from quietbus.scenario import Scenario, load_scenario
-from quietbus.solve.direct import Tolerances, integrate
+from quietbus.solve.direct import Scheme, Tolerances, integrate
 from quietbus.study import Study
 
 Mount = Literal["isolated", "rigid"]
@@ -214,7 +214,7 @@ def _direct(
         settings.duration,
         settings.output_rate,
         Tolerances(settings.tolerances.relative, settings.tolerances.absolute),
-        joint_forces,
+        Scheme(joint_forces=joint_forces),
         progress,
     )
     return to_dataset(scenario, solution, time.perf_counter() - started)

@@ -82,8 +82,8 @@ def accelerations(
         moments = ClusterMoments.expand(satellite.cluster)
     plates = plate_motion(state)
     carried = moments.at(state.gimbal_angle, rotor_angle, state.gimbal_rate, gimbal_acceleration)
-    M, f = mass_and_force(satellite, plates, carried)
-    f = f + wrench.on_speeds
+    M = mass_matrix(satellite, plates, carried)
+    f = force(satellite, plates, carried, jnp.zeros(12)) + wrench.on_speeds
     if satellite.mount == "rigid":
         # v_P = v_B + w_B x r and w_P = w_B: the same twelve equations on six speeds
         T, w_B = rigid_speeds(satellite, plates), plates.w_B
@@ -95,16 +95,45 @@ def accelerations(
     return Accelerations(*u_rate.reshape(4, 3))
 
 
-def mass_and_force(
+def mass_matrix(
     satellite: Satellite, plates: PlateMotion, carried: CarriedMotion
-) -> tuple[Float[Array, "12 12"], Float[Array, "12"]]:
-    """Mass matrix M and force f of ``M du/dt = f``, external loads left out."""
-    legs = leg_motion(satellite.legs, plates)
-    M_P, f_P = plate_mass_and_force(plates, _with_plate(satellite, carried))
-    M_B, f_B = _bus(satellite, plates)
+) -> Float[Array, "12 12"]:
+    """M of ``M du/dt = f``."""
+    legs = leg_mass_matrix(satellite.legs, leg_motion(satellite.legs, plates))
+    return legs + body_mass_matrix(satellite, plates, carried)
+
+
+def force(
+    satellite: Satellite, plates: PlateMotion, carried: CarriedMotion, u_rate: Float[Array, "12"]
+) -> Float[Array, "12"]:
+    """``f - M du/dt``, external loads left out; the force f at ``u_rate`` zero."""
+    legs = leg_forces(satellite.legs, leg_motion(satellite.legs, plates), plates, u_rate)
+    return legs + body_force(satellite, plates, carried, u_rate)
+
+
+def body_mass_matrix(
+    satellite: Satellite, plates: PlateMotion, carried: CarriedMotion
+) -> Float[Array, "12 12"]:
+    """Mass matrix of the plate with all it carries and of the bus; without the legs."""
+    moments = _with_plate(satellite, carried)
+    R, c_skew = plates.R_NP, skew(rotate(plates.R_NP, moments.c))
+    M_P = jnp.block([[moments.mass * jnp.eye(3), -c_skew], [c_skew, R @ moments.J @ R.T]])
+    J_B = plates.R_NB @ satellite.bus.I_BBcm_B @ plates.R_NB.T
+    zero = jnp.zeros((3, 3))
+    M_B = jnp.block([[satellite.bus.mass * jnp.eye(3), zero], [zero, J_B]])
     zero = jnp.zeros((6, 6))
-    M = leg_mass_matrix(satellite.legs, legs) + jnp.block([[M_P, zero], [zero, M_B]])
-    return M, leg_forces(satellite.legs, legs, plates) + jnp.concatenate([f_P, f_B])
+    return jnp.block([[M_P, zero], [zero, M_B]])
+
+
+def body_force(
+    satellite: Satellite, plates: PlateMotion, carried: CarriedMotion, u_rate: Float[Array, "12"]
+) -> Float[Array, "12"]:
+    """``f - M du/dt`` of the plate with all it carries and of the bus; without the legs."""
+    dv_B, dw_B = u_rate[6:9], u_rate[9:]
+    on_plate = plate_force(plates, _with_plate(satellite, carried), u_rate[:6])
+    J = plates.R_NB @ satellite.bus.I_BBcm_B @ plates.R_NB.T
+    torque = rotate(J, dw_B) + cross(plates.w_B, rotate(J, plates.w_B))
+    return jnp.concatenate([on_plate, -satellite.bus.mass * dv_B, -torque])
 
 
 def rigid_speeds(satellite: Satellite, plates: PlateMotion) -> Float[Array, "12 6"]:
@@ -127,28 +156,24 @@ def _with_plate(satellite, carried):
     )
 
 
-def plate_mass_and_force(
-    plates: PlateMotion, carried: CarriedMotion
-) -> tuple[Float[Array, "6 6"], Float[Array, "6"]]:
-    """Mass matrix and force, on (v_P, w_P), of mass moments that the plate carries.
-
-    Both are linear in the moments.
-    """
+def plate_force(
+    plates: PlateMotion, carried: CarriedMotion, u_rate: Float[Array, "6"]
+) -> Float[Array, "6"]:
+    """``f - M du/dt`` on (v_P, w_P) of mass moments that the plate carries; linear in these."""
     R = plates.R_NP
-    w = rotate(R.T, plates.w_P)
-    # d/dt of (m v + w x c + p, c x v + J w + H) at dv/dt = dw/dt = 0; rates are taken in the plate
-    force = -(cross(w, cross(w, carried.c) + 2.0 * carried.p) + carried.p_rate)
-    torque = -(
-        rotate(carried.J_rate, w) + cross(w, rotate(carried.J, w) + carried.H) + carried.H_rate
+    w, dv, dw = (rotate(R.T, vector) for vector in (plates.w_P, u_rate[:3], u_rate[3:]))
+    # d/dt of (m v + w x c + p, c x v + J w + H); rates are taken in the plate
+    force = (
+        carried.mass * dv
+        + cross(dw, carried.c)
+        + cross(w, cross(w, carried.c) + 2.0 * carried.p)
+        + carried.p_rate
     )
-    c_skew = skew(rotate(R, carried.c))
-    M = jnp.block([[carried.mass * jnp.eye(3), -c_skew], [c_skew, R @ carried.J @ R.T]])
-    return M, jnp.concatenate([rotate(R, force), rotate(R, torque)])
-
-
-def _bus(satellite, plates):
-    """Mass matrix and force of the bus, on (v_B, w_B)."""
-    J = plates.R_NB @ satellite.bus.I_BBcm_B @ plates.R_NB.T
-    zero = jnp.zeros((3, 3))
-    M = jnp.block([[satellite.bus.mass * jnp.eye(3), zero], [zero, J]])
-    return M, jnp.concatenate([jnp.zeros(3), -cross(plates.w_B, rotate(J, plates.w_B))])
+    torque = (
+        cross(carried.c, dv)
+        + rotate(carried.J, dw)
+        + rotate(carried.J_rate, w)
+        + cross(w, rotate(carried.J, w) + carried.H)
+        + carried.H_rate
+    )
+    return -jnp.concatenate([rotate(R, force), rotate(R, torque)])

@@ -75,11 +75,13 @@ def leg_mass_matrix(legs: Hexapod, motion: LegMotion) -> Float[Array, "12 12"]:
     return rows.T @ weighted_rows + jnp.block([[PP, PB], [PB.T, BB]])
 
 
-def leg_forces(legs: Hexapod, motion: LegMotion, plates: PlateMotion) -> Float[Array, "12"]:
-    """Forces of struts, friction and the legs' inertia at zero du/dt on (v_P, w_P, v_B, w_B)."""
+def leg_forces(
+    legs: Hexapod, motion: LegMotion, plates: PlateMotion, u_rate: Float[Array, "12"]
+) -> Float[Array, "12"]:
+    """Forces of struts, friction and the legs' inertia on (v_P, w_P, v_B, w_B), at their rates."""
     m_u, m_d, I_t, I_a = (value[:, None] for value in _masses(legs))
-    zero = jnp.zeros(3)
-    bias = leg_accelerations(motion, plates, zero, zero, zero, zero)
+    dv_P, dw_P, dv_B, dw_B = u_rate.reshape(4, 3)
+    bias = leg_accelerations(motion, plates, dv_B, dw_B, dv_P, dw_P)
     friction = joint_friction(legs, motion, plates)
     torque, s = friction.at_U + friction.at_A, motion.s
     d_u, d_d = legs.upper.distance[:, None], legs.lower.distance[:, None]

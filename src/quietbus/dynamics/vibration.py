@@ -3,174 +3,253 @@
 The slow motion is that of the satellite with the imbalance averaged over the rotors' turns. About
 it, the deviations ``xi = (r_P, theta_P, r_B, theta_B)`` of both plates (displacements and rotation
 vectors), those of the gimbal angles and those of the controller's integral obey linear equations
-with coefficients that change slowly. In a frame that turns with the bus they answer ``F exp(st)``
-with ``X exp(st)``, and
+whose coefficients change slowly. In the frame that turns with the bus they answer ``F exp(st)``
+with ``xi exp(st)``, where
 
-    Z(s) X = F,    Z(s) = s^2 M + s C + K + (gyroscopic, control and gimbal terms)
+    (s^2 M + s C + K) xi = F + gimbals' reaction
 
-is solved for each order of each rotor (docs/theory.md, section 13). All matrices are derivatives,
+is solved for each order of each rotor (docs/theory.md, section 14). All matrices are derivatives,
 by automatic differentiation, of the equations of motion themselves.
 
-Vectors are in inertial components, which at the instant looked at are those of the turning frame.
+All vectors are along the bus axes of the slow motion at the instant looked at.
 """
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Complex, Float
 
 from quietbus.dynamics.closed_loop import control_signals, evaluate, external_wrench
 from quietbus.dynamics.equations import (
-    mass_and_force,
-    plate_mass_and_force,
+    body_force,
+    body_mass_matrix,
+    plate_force,
     plate_motion,
     rigid_speeds,
 )
-from quietbus.dynamics.kinematics import PlateMotion
+from quietbus.dynamics.kinematics import PlateMotion, leg_motion
+from quietbus.dynamics.legs import leg_forces, leg_mass_matrix
 from quietbus.dynamics.state import State
 from quietbus.model.cmg import ORDERS, ClusterMoments
 from quietbus.model.satellite import Satellite
-from quietbus.spatial.rotation import quaternion_multiply, skew
-from quietbus.spatial.vector import cross
+from quietbus.spatial.rotation import quaternion_multiply, quaternion_to_matrix, skew
+from quietbus.spatial.vector import cross, dot, rotate, solve_small
+
+
+class SlowMotion(eqx.Module):
+    """The slow motion at one instant."""
+
+    t: Float[Array, ""]  # [s]
+    state: State
+    plates: PlateMotion  # along bus axes, so that R_NB is the unit matrix
+    u_rate: Float[Array, "12"]  # accelerations (dv_P, dw_P, dv_B, dw_B)
+    gimbal: tuple[Float[Array, " cmg"], ...]  # angle [rad], rate and acceleration
+
+
+def slow_motion(
+    satellite: Satellite, t: Float[Array, ""], state: State, averaged: ClusterMoments
+) -> SlowMotion:
+    """The slow motion at time t [s]; ``averaged`` as of ``ClusterMoments.averaged``."""
+    signals, a = evaluate(satellite, t, state, jnp.zeros_like(state.gimbal_angle), averaged)
+    plates, R_BN = plate_motion(state), quaternion_to_matrix(state.q_NB).T
+    vectors = (plates.p_BP, plates.v_B, plates.w_B, plates.v_P, plates.w_P)
+    along_bus = PlateMotion(jnp.eye(3), R_BN @ plates.R_NP, *(rotate(R_BN, v) for v in vectors))
+    u_rate = jnp.stack([a.v_P, a.w_P, a.v_B, a.w_B])
+    gimbal = (state.gimbal_angle, state.gimbal_rate, signals.gimbal_acceleration)
+    return SlowMotion(t, state, along_bus, rotate(R_BN, u_rate).reshape(12), gimbal)
+
+
+class Coefficients(eqx.Module):
+    """``M du/dt = by_pose xi + by_speed u``, deviations of what acts on (v_P, w_P, v_B, w_B)."""
+
+    M: Float[Array, "12 12"]
+    by_pose: Float[Array, "12 12"]
+    by_speed: Float[Array, "12 12"]
+    force: Float[Array, "12"]  # f - M du/dt of the slow motion
+
+
+def leg_coefficients(satellite: Satellite, slow: SlowMotion) -> Coefficients:
+    """What the legs contribute."""
+    legs, plates = satellite.legs, slow.plates
+
+    def force(plates):
+        return leg_forces(legs, leg_motion(legs, plates), plates, slow.u_rate)
+
+    held, columns = _derivatives(force, plates, jnp.eye(18))
+    r, theta_P, theta_B, v, w_P, w_B = jnp.split(columns, 6, axis=1)
+    return Coefficients(
+        M=leg_mass_matrix(legs, leg_motion(legs, plates)),
+        by_pose=jnp.concatenate([r, theta_P, -r, theta_B], axis=1),
+        by_speed=jnp.concatenate([v, w_P, -v, w_B], axis=1),
+        force=held,
+    )
+
+
+def body_coefficients(
+    satellite: Satellite, slow: SlowMotion, averaged: ClusterMoments
+) -> Coefficients:
+    """What plate, cluster, bus and external loads contribute."""
+    carried = averaged.at(slow.gimbal[0], jnp.zeros_like(slow.gimbal[0]), *slow.gimbal[1:])
+    R_NB = quaternion_to_matrix(slow.state.q_NB)
+
+    def force(plates):
+        own = body_force(satellite, plates, carried, slow.u_rate)
+        if not satellite.loads:
+            return own
+        attitudes = lambda p: (p.R_NB, p.R_NP)  # noqa: E731
+        inertial = eqx.tree_at(attitudes, plates, tuple(R_NB @ R for R in attitudes(plates)))
+        loads = external_wrench(satellite, slow.t, inertial).on_speeds
+        return own + rotate(R_NB.T, loads.reshape(4, 3)).reshape(12)
+
+    # position and velocity of the plate do not matter to these
+    ways = jnp.eye(18)[jnp.array([3, 4, 5, 6, 7, 8, 12, 13, 14, 15, 16, 17])]
+    held, columns = _derivatives(force, slow.plates, ways)
+    theta_P, theta_B, w_P, w_B = jnp.split(columns, 4, axis=1)
+    zero = jnp.zeros((12, 3))
+    return Coefficients(
+        M=body_mass_matrix(satellite, slow.plates, carried),
+        by_pose=jnp.concatenate([zero, theta_P, zero, theta_B], axis=1),
+        by_speed=jnp.concatenate([zero, w_P, zero, w_B], axis=1),
+        force=held,
+    )
+
+
+def _derivatives(force, plates, ways):
+    """Value of ``force`` and its derivatives (12, way) along (r, theta_P, theta_B, v, w_P, w_B).
+
+    r and v are those of the plate from the bus.
+    """
+    turned = lambda theta, R: cross(theta, R.T).T  # noqa: E731
+
+    def moved(way):
+        r, theta_P, theta_B, v, w_P, w_B = way.reshape(6, 3)
+        turn = turned(theta_B, plates.R_NB), turned(theta_P, plates.R_NP)
+        return PlateMotion(*turn, r, jnp.zeros(3), w_B, v, w_P)
+
+    held, push = jax.linearize(force, plates)
+    return held, jax.vmap(lambda way: push(moved(way)), out_axes=1)(ways)
+
+
+class Control(eqx.Module):
+    """How the gimbals answer the bus: ``d(gimbal acceleration, rate of the integral)``."""
+
+    by_attitude: Float[Array, "cmg+3 3"]  # theta_B
+    by_rate: Float[Array, "cmg+3 3"]  # w_NB_B
+    by_integral: Float[Array, "cmg+3 3"]
+    by_angle: Float[Array, "cmg+3 cmg"]
+    by_angle_rate: Float[Array, "cmg+3 cmg"]
+    reaction: Float[Array, "3 n cmg"]  # on the plates, of gimbal angle, rate and acceleration
+
+    def memory(self, s: Complex[Array, ""], given: Complex[Array, "cmg+3 3"]):
+        """Gimbal angles and integral (cmg+3, 3) as controller and servo answer ``given``."""
+        n = self.by_angle.shape[1]
+        fed_back = jnp.concatenate([self.by_angle + s * self.by_angle_rate, self.by_integral], 1)
+        own = jnp.concatenate([jnp.full(n, s**2), jnp.full(3, s)])
+        return solve_small(jnp.diag(own) - fed_back, given)
 
 
 class Vibration(eqx.Module):
-    """Coefficients of the linear equations of small vibration at one instant.
+    """Equations of small vibration at one instant, on xi or on a rigid mount on (r_B, theta_B)."""
 
-    ``M du/dt = by_pose xi + by_speed u + by_gimbal (gamma, dgamma/dt, d2gamma/dt2) + F``, all of
-    them deviations, on the speeds (v_P, w_P, v_B, w_B).
-    """
+    slow: SlowMotion
+    M: Float[Array, "n n"]
+    C: Float[Array, "n n"]
+    K: Float[Array, "n n"]
+    control: Control | None  # None where the gimbals do not move
+    projection: Float[Array, "12 n"] | None  # xi of a rigid mount by (r_B, theta_B)
 
-    plates: PlateMotion  # of the slow motion
-    M: Float[Array, "12 12"]
-    by_pose: Float[Array, "12 12"]  # on xi
-    by_speed: Float[Array, "12 12"]
-    by_gimbal: Float[Array, "12 3 cmg"]
-    holding: Float[Array, "12"]  # force of a rigid mount in the slow motion; 0 if isolated
-    # d(gimbal acceleration, rate of the integral) by theta_B, w_NB_B, integral, gamma, dgamma/dt
-    control: Float[Array, "cmg+3 9+2*cmg"] | None  # None where the gimbals do not move
-    projection: Float[Array, "12 6"] | None  # of a rigid mount
+    @property
+    def turning(self) -> Float[Array, "3 3"]:
+        """[w_B x]: what the time derivative of a vector has more than that of its components."""
+        return skew(self.slow.plates.w_B)
+
+    def memory(self, s: Complex[Array, ""]) -> Complex[Array, "cmg+3 3"]:
+        """Deviations of gimbal angles and integral by theta_B."""
+        control = self.control
+        rate = s * jnp.eye(3) + self.turning  # of the bus, along its own axes
+        return control.memory(s, control.by_attitude + control.by_rate @ rate)
 
     def stiffness(self, s: Complex[Array, ""]) -> Complex[Array, "n n"]:
-        """Dynamic stiffness Z(s), 12 x 12, or 6 x 6 on a rigid mount; control included."""
-        speed, turn_B = self.speeds(s), self.turning(s)
-        along = jnp.kron(jnp.eye(4), turn_B)
-        Z = self.M @ (along @ speed) - self.by_pose - self.by_speed @ speed
-        gimbal = self.gimbals(s)
-        if gimbal is not None:
-            powers = jnp.array([1.0, s, s**2])
-            Z = Z.at[:, 9:].add(-jnp.einsum("ikj,k,ja->ia", self.by_gimbal, powers, gimbal))
-        if self.projection is None:
-            return Z
-        # virtual work of the mount's force as its arm turns with the bus
-        arm = skew(self.holding[:3]) @ skew(self.plates.p_BP)
-        Z = self.projection.T @ Z @ self.projection
-        return Z.at[3:, 3:].add(-arm)
-
-    def turning(self, s: Complex[Array, ""]) -> Complex[Array, "3 3"]:
-        """d/dt of a vector whose components in the turning frame go as exp(st)."""
-        return s * jnp.eye(3) + skew(self.plates.w_B)
-
-    def speeds(self, s: Complex[Array, ""]) -> Complex[Array, "12 12"]:
-        """Deviations of (v_P, w_P, v_B, w_B) by xi."""
-        turn = self.turning(s)
-        blocks = (turn, turn - skew(self.plates.w_P), turn, turn - skew(self.plates.w_B))
-        return jax.scipy.linalg.block_diag(*blocks)
-
-    def gimbals(self, s: Complex[Array, ""]) -> Complex[Array, "cmg 3"] | None:
-        """Deviations of the gimbal angles by theta_B, through controller, steering and servo."""
+        """Dynamic stiffness of the controlled satellite."""
+        Z = s**2 * self.M + s * self.C + self.K
         if self.control is None:
-            return None
-        n = self.by_gimbal.shape[2]
-        attitude, rate, integral, gamma, gamma_rate = jnp.split(
-            self.control, [3, 6, 9, 9 + n], axis=1
-        )
-        memory = jnp.concatenate([gamma + s * gamma_rate, integral], axis=1)
-        own = jnp.diag(jnp.concatenate([jnp.full(n, s**2), jnp.full(3, s)])) - memory
-        # the bus rate's components turn with the bus
-        given = attitude + rate @ self.plates.R_NB.T @ self.turning(s)
-        return jnp.linalg.solve(own, given)[:n]
+            return Z
+        angle = self.memory(s)[:-3]
+        angles = jnp.stack([angle, s * angle, s**2 * angle])
+        return Z.at[:, -3:].add(-jnp.einsum("kia,kab->ib", self.control.reaction, angles))
 
-    def respond(self, s: Complex[Array, ""], force: Complex[Array, "12"]) -> Complex[Array, "12"]:
-        """xi for a force F exp(st) on the speeds."""
-        if self.projection is None:
-            return jnp.linalg.solve(self.stiffness(s), force)
+    def respond(
+        self, s: Complex[Array, ""], force: Complex[Array, "12 m"]
+    ) -> Complex[Array, "12 m"]:
+        """xi for forces F exp(st) on the speeds."""
         T = self.projection
-        return T @ jnp.linalg.solve(self.stiffness(s), T.T @ force)
+        if T is None:
+            return solve_small(self.stiffness(s), force)
+        return T @ solve_small(self.stiffness(s), T.T @ force)
+
+    def state_matrix(self) -> np.ndarray:
+        """A of dx/dt = A x (NumPy); x: xi, its rate, gimbal angles, their rates, the integral."""
+        n = len(self.M)
+        pull, damp = (np.linalg.solve(self.M, -np.asarray(matrix)) for matrix in (self.K, self.C))
+        if self.control is None:
+            return np.block([[np.zeros((n, n)), np.eye(n)], [pull, damp]])
+        control = self.control
+        m = control.by_angle.shape[1]
+        pad = np.zeros((m + 3, n - 3))
+        by_pose = control.by_attitude + control.by_rate @ np.asarray(self.turning)
+        decided = np.hstack(
+            [
+                pad,
+                by_pose,
+                pad,
+                *(
+                    getattr(control, name)
+                    for name in ("by_rate", "by_angle", "by_angle_rate", "by_integral")
+                ),
+            ]
+        )
+        angle, rate, acceleration = np.linalg.solve(self.M, control.reaction)
+        moved = np.hstack([pull, damp, angle, rate, np.zeros((n, 3))])
+        moved = moved + acceleration @ decided[:m]
+        unit = np.eye(decided.shape[1])
+        return np.vstack([unit[n : 2 * n], moved, unit[2 * n + m : 2 * n + 2 * m], decided])
 
 
 def vibration(
-    satellite: Satellite, t: Float[Array, ""], state: State, averaged: ClusterMoments
-) -> tuple[Vibration, Float[Array, "12"], Float[Array, " cmg"]]:
+    satellite: Satellite, slow: SlowMotion, moments: ClusterMoments, legs: Coefficients
+) -> Vibration:
     """Equations of small vibration about a slow motion.
 
     Args:
-        t: time [s].
-        state: of the slow motion.
-        averaged: ``ClusterMoments.expand(satellite.cluster).averaged()``.
-
-    Returns:
-        The equations; accelerations of the slow motion (dv_P, dw_P, dv_B, dw_B); its gimbal
-        accelerations [rad/s^2].
+        moments: ``ClusterMoments.expand(satellite.cluster)``.
+        legs: ``leg_coefficients(satellite, slow)``.
     """
-    n = len(state.gimbal_angle)
-    still = jnp.zeros(n)
-    signals, a = evaluate(satellite, t, state, still, averaged)
-    u_rate = jnp.concatenate([a.v_P, a.w_P, a.v_B, a.w_B])
-    plates = plate_motion(state)
-    gimbal = (state.gimbal_angle, state.gimbal_rate, signals.gimbal_acceleration)
-
-    def carried(gimbal):
-        return averaged.at(gimbal[0], still, *gimbal[1:])
-
-    def force(plates):
-        """f - M du/dt + loads, with the mass matrix on the way."""
-        M, f = mass_and_force(satellite, plates, carried(gimbal))
-        return f - M @ u_rate + external_wrench(satellite, t, plates).on_speeds, M
-
-    def on_plate(gimbal):
-        M, f = plate_mass_and_force(plates, carried(gimbal))
-        return jnp.concatenate([f - M @ u_rate[:6], jnp.zeros(6)])
-
-    residual, push, M = jax.linearize(force, plates, has_aux=True)
-    columns = jax.vmap(lambda way: push(_tangent(plates, way)), out_axes=1)(jnp.eye(18))
-    r, theta_P, theta_B, v, w_P, w_B = jnp.split(columns, 6, axis=1)
-    return (
-        Vibration(
-            plates=plates,
-            M=M,
-            by_pose=jnp.concatenate([r, theta_P, -r, theta_B], axis=1),
-            by_speed=jnp.concatenate([v, w_P, -v, w_B], axis=1),
-            by_gimbal=jnp.stack(jax.jacfwd(on_plate)(gimbal), axis=1),
-            holding=residual,
-            control=_control(satellite, t, state),
-            projection=rigid_speeds(satellite, plates) if satellite.mount == "rigid" else None,
-        ),
-        u_rate,
-        signals.gimbal_acceleration,
-    )
+    bodies = body_coefficients(satellite, slow, moments.averaged())
+    all_ = jax.tree.map(jnp.add, bodies, legs)
+    # du/dt = (s + W) u and u = (s + V) xi, in the frame that turns with the bus
+    W = skew(slow.plates.w_B)
+    V = jax.scipy.linalg.block_diag(W, W - skew(slow.plates.w_P), W, jnp.zeros((3, 3)))
+    W = jnp.kron(jnp.eye(4), W)
+    C = all_.M @ (W + V) - all_.by_speed
+    K = all_.M @ W @ V - all_.by_pose - all_.by_speed @ V
+    control = _control(satellite, slow, moments)
+    if satellite.mount == "isolated":
+        return Vibration(slow, all_.M, C, K, control, None)
+    T = rigid_speeds(satellite, slow.plates)
+    M, C, K = (T.T @ matrix @ T for matrix in (all_.M, C, K))
+    # virtual work of the mount's force, which holds the plate, as its arm turns with the bus
+    K = K.at[3:, 3:].add(-skew(all_.force[:3]) @ skew(slow.plates.p_BP))
+    if control is not None:
+        control = eqx.tree_at(lambda c: c.reaction, control, T.T @ control.reaction)
+    return Vibration(slow, M, C, K, control, T)
 
 
-def _tangent(plates: PlateMotion, way: Float[Array, "18"]) -> PlateMotion:
-    """Change of the plates' motion by (r, theta_P, theta_B, v, w_P, w_B), r and v of P from B."""
-    r, theta_P, theta_B, v, w_P, w_B = way.reshape(6, 3)
-    turned = lambda theta, R: cross(theta, R.T).T  # noqa: E731
-    return PlateMotion(
-        R_NB=turned(theta_B, plates.R_NB),
-        R_NP=turned(theta_P, plates.R_NP),
-        p_BP=r,
-        v_B=jnp.zeros(3),
-        w_B=w_B,
-        v_P=v,
-        w_P=w_P,
-    )
-
-
-def _control(satellite, t, state):
-    """Derivatives of what controller, steering and servo decide (see ``Vibration.control``)."""
+def _control(satellite, slow, moments):
+    """Derivatives of what controller, steering and servo decide, and the gimbals' reaction."""
     if satellite.controller is None or satellite.steering is None:
         return None
-    n = len(state.gimbal_angle)
+    state, n = slow.state, len(slow.gimbal[0])
 
     def decide(theta, rate, integral, gamma, gamma_rate):
         small = jnp.concatenate([jnp.ones(1), 0.5 * theta])
@@ -178,53 +257,118 @@ def _control(satellite, t, state):
             lambda s: (s.q_NB, s.w_NB_B, s.error_integral, s.gimbal_angle, s.gimbal_rate),
             state,
             (
-                quaternion_multiply(small, state.q_NB),
+                quaternion_multiply(state.q_NB, small),
                 state.w_NB_B + rate,
                 state.error_integral + integral,
                 state.gimbal_angle + gamma,
                 state.gimbal_rate + gamma_rate,
             ),
         )
-        signals = control_signals(satellite, t, moved)
+        signals = control_signals(satellite, slow.t, moved)
         return jnp.concatenate([signals.gimbal_acceleration, signals.integral_rate])
 
+    def reaction(gimbal):
+        push = jax.vmap(plate_force, (None, 0, None))
+        return push(slow.plates, moments.order(0, *gimbal), slow.u_rate[:6])
+
     nothing = (jnp.zeros(3), jnp.zeros(3), jnp.zeros(3), jnp.zeros(n), jnp.zeros(n))
-    return jnp.concatenate(jax.jacfwd(decide, argnums=tuple(range(5)))(*nothing), axis=1)
+    # each unit's reaction is its own: one derivative for all units at once
+    ways = [tuple(jnp.full(n, float(i == k)) for i in range(3)) for k in range(3)]
+    reactions = jnp.stack([jax.jvp(reaction, (slow.gimbal,), (way,))[1].T for way in ways])
+    return Control(
+        *jax.jacfwd(decide, argnums=tuple(range(5)))(*nothing),
+        reaction=jnp.pad(reactions, ((0, 0), (0, 6), (0, 0))),
+    )
 
 
-class RotorResponse(eqx.Module):
-    """Steady response to every order of every rotor; deviations are Re(... exp(i h phi_j))."""
-
-    s: Complex[Array, "cmg order"]  # [rad/s] i h Omega_j
-    xi: Complex[Array, "cmg order 12"]  # [m, rad] of (r_P, theta_P, r_B, theta_B)
+def rotor_forces(slow: SlowMotion, moments: ClusterMoments) -> Complex[Array, "order cmg 12"]:
+    """Amplitudes of the forces on (v_P, w_P, v_B, w_B) at each order of each rotor."""
+    push = jax.vmap(plate_force, (None, 0, None))
+    on_plate = [push(slow.plates, moments.order(h, *slow.gimbal), slow.u_rate[:6]) for h in ORDERS]
+    return jnp.pad(jnp.stack(on_plate), ((0, 0), (0, 0), (0, 6)))
 
 
 def rotor_response(
-    satellite: Satellite, t: Float[Array, ""], state: State, moments: ClusterMoments
-) -> tuple[Vibration, RotorResponse]:
-    """Response to all rotors' imbalance about a slow motion.
+    small: Vibration, moments: ClusterMoments, equal_speed: tuple[int, ...]
+) -> Complex[Array, "cmg order 12"]:
+    """xi of the steady response to each order of each rotor, Re(xi exp(i h phi)).
 
     Args:
-        t: time [s].
-        state: of the slow motion.
         moments: ``ClusterMoments.expand(satellite.cluster)``.
+        equal_speed: (cmg,) for each rotor the number of one that turns at the same speed, itself
+            or one before it; see ``equal_speeds``.
     """
-    small, u_rate, gimbal_acceleration = vibration(satellite, t, state, moments.averaged())
-    orders = moments.orders(state.gimbal_angle, state.gimbal_rate, gimbal_acceleration)
+    forces = rotor_forces(small.slow, moments)
+    responses: dict[tuple[int, int], Array] = {}
+    for first in set(equal_speed):
+        for order, h in enumerate(ORDERS):
+            s = 1j * h * moments.rotor_speed[first]
+            # a rotor that stands still shakes nothing
+            standing = s == 0.0
+            xi = small.respond(jnp.where(standing, 1j, s), forces[order].T)
+            responses[first, order] = jnp.where(standing, 0.0, xi)
+    return jnp.stack(
+        [
+            jnp.stack([responses[first, order][:, j] for order in range(len(ORDERS))])
+            for j, first in enumerate(equal_speed)
+        ]
+    )
 
-    def one(carried, s):
-        M, f = plate_mass_and_force(small.plates, carried)
-        force = jnp.concatenate([f - M @ u_rate[:6], jnp.zeros(6)])
-        # a rotor that stands still turns nothing: what its imbalance does is in the slow motion
-        at_rest = s == 0.0
-        xi = small.respond(jnp.where(at_rest, 1j, s), force)
-        return jnp.where(at_rest, 0.0, xi)
 
-    s = 1j * jnp.array(ORDERS) * satellite.cluster.rotor_speed[:, None]
-    return small, RotorResponse(s, jax.vmap(jax.vmap(one))(orders, s))
+def equal_speeds(satellite: Satellite) -> tuple[int, ...]:
+    """(cmg,) for each rotor the number of the first one that turns at exactly the same speed."""
+    speeds = np.asarray(satellite.cluster.rotor_speed).tolist()
+    return tuple(speeds.index(speed) for speed in speeds)
 
 
-def bus_rate(small: Vibration, response: RotorResponse) -> Complex[Array, "cmg order 3"]:
-    """Amplitudes of the bus rate [rad/s], bus axes."""
-    turn = jax.vmap(jax.vmap(small.turning))(response.s)
-    return jnp.einsum("joac,joc,ab->job", turn, response.xi[..., 9:], small.plates.R_NB)
+class View(eqx.Module):
+    """What of the bus is looked at, beyond the usual outputs."""
+
+    point_B: Float[Array, "point 3"]  # [m] where accelerations are wanted
+    line_of_sight_B: Float[Array, "line 3"]  # [-] unit vectors
+
+
+def linear_outputs(
+    satellite: Satellite,
+    small: Vibration,
+    s: Complex[Array, ""],
+    xi: Complex[Array, "12"],
+    view: View,
+) -> dict[str, Complex[Array, "..."]]:
+    """Deviations of the outputs, by their names in a run, for one response xi exp(st)."""
+    legs, plates = satellite.legs, small.slow.plates
+    r_P, theta_P, r_B, theta_B = xi.reshape(4, 3)
+    motion = leg_motion(legs, plates)
+    joints = r_P + cross(theta_P, motion.r_U) - r_B - cross(theta_B, motion.r_A)
+    stroke = dot(motion.s, joints)
+    at, one = (motion.length, motion.length_rate), jnp.ones_like(motion.length)
+    _, spring = jax.jvp(legs.strut_force, at, (one, 0.0 * one))
+    _, damper = jax.jvp(legs.strut_force, at, (0.0 * one, one))
+    turning = s * jnp.eye(3) + small.turning
+    point = r_B + cross(theta_B, view.point_B)
+    return {
+        "bus_rate": turning @ theta_B,
+        "bus_attitude": theta_B,
+        "platform_rate": plates.R_NP.T @ turning @ theta_P,
+        "leg_stroke": stroke,
+        "leg_force": (spring + s * damper) * stroke,
+        "point_acceleration": rotate(turning @ turning, point),
+        "line_of_sight": cross(theta_B, view.line_of_sight_B),
+    }
+
+
+def motion_amplitudes(
+    small: Vibration, s: Complex[Array, ""], xi: Complex[Array, "12"]
+) -> dict[str, Complex[Array, "..."]]:
+    """What of the state vibrates in one response: xi, its rate, and the gimbals with the integral.
+
+    The rates are those of the vectors, not of their components; ``memory`` holds gimbal angles,
+    their rates and the integral, all still if the gimbals are held.
+    """
+    n = len(small.slow.gimbal[0])
+    rate = xi.reshape(4, 3) @ (s * jnp.eye(3) + small.turning).T
+    memory = jnp.zeros(2 * n + 3, complex)
+    if small.control is not None:
+        moved = small.memory(s) @ xi[9:]
+        memory = jnp.concatenate([moved[:n], s * moved[:n], moved[n:]])
+    return {"pose": xi, "pose_rate": rate.reshape(12), "memory": memory}

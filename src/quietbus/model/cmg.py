@@ -190,41 +190,36 @@ class ClusterMoments(eqx.Module):
             H_rate=b1_[3:] + H_gimbal_rate,
         )
 
-    def orders(
+    def order(
         self,
+        h: int,
         gamma: Float[Array, " cmg"],
         gamma_rate: Float[Array, " cmg"],
         gamma_acceleration: Float[Array, " cmg"],
     ) -> CarriedMotion:
-        """Complex amplitudes of the moments at each order of each rotor, axes (cmg, order, ...).
+        """Complex amplitudes of each unit's moments at order h, with a leading axis of units.
 
-        The moments are ``averaged().at(...)`` plus the real part of the sum over units and orders
-        h of ``amplitude * exp(i h phi)``. Arguments as of ``at``.
+        The moments are the real part of the sum of ``amplitude * exp(i h phi)`` over units and
+        orders, from h = 0 (their mean) to 2. The mass, which is constant, is left out.
         """
-
-        def unit(c_H, J, H_gimbal, speed, *gimbal):
-            def order(h):
-                rotating = [
-                    k.at[..., : 2 * h - 1].set(0).at[..., 2 * h + 1 :].set(0)
-                    for k in (c_H[:, None], J[:, None], H_gimbal[:, None])
-                ]
-                part = ClusterMoments(jnp.zeros(()), speed[None], *rotating)
-                gamma, rate, acceleration = (value[None] for value in gimbal)
-                quarter = jnp.full(1, 0.5 * np.pi / h)
-                cosine = part.at(gamma, jnp.zeros(1), rate, acceleration)
-                sine = part.at(gamma, quarter, rate, acceleration)
-                return jax.tree.map(lambda a, b: a - 1j * b, cosine, sine)
-
-            return jax.tree.map(lambda *each: jnp.stack(each), *(order(h) for h in ORDERS))
-
-        return jax.vmap(unit, (1, 1, 1, 0, 0, 0, 0))(
-            self.c_H,
-            self.J,
-            self.H_gimbal,
-            self.rotor_speed,
-            gamma,
-            gamma_rate,
-            gamma_acceleration,
+        one, first, second = _basis(gamma)
+        rate, acceleration = gamma_rate[:, None], gamma_acceleration[:, None]
+        # the time derivative of exp(i h phi) is a factor, that of the gimbal basis is its own
+        spin = 1j * h * self.rotor_speed[:, None] if h else 0.0
+        b1 = spin * one + rate * first
+        b2 = spin**2 * one + 2.0 * spin * rate * first + rate**2 * second + acceleration * first
+        times = lambda row, k: jnp.einsum("jg,mjg->jm", row[:, : k.shape[2]], k)  # noqa: E731
+        c_H, J, H_gimbal = (_amplitude(k, h) for k in (self.c_H, self.J, self.H_gimbal))
+        at, at_rate, at_second = (times(row, c_H) for row in (one, b1, b2))
+        return CarriedMotion(
+            mass=jnp.zeros(len(gamma)),
+            c=at[:, :3],
+            J=times(one, J)[:, _SYMMETRIC],
+            p=at_rate[:, :3],
+            H=at[:, 3:] + times(rate * one, H_gimbal),
+            J_rate=times(b1, J)[:, _SYMMETRIC],
+            p_rate=at_second[:, :3],
+            H_rate=at_rate[:, 3:] + times(rate * b1 + acceleration * one, H_gimbal),
         )
 
 
@@ -250,6 +245,15 @@ def _basis(x: Float[Array, " cmg"]) -> Float[Array, "3 cmg 5"]:
 _FROM_SAMPLES = np.linalg.inv(
     np.stack([0 * _SAMPLES + 1, *(trig(n * _SAMPLES) for n in (1, 2) for trig in (np.cos, np.sin))])
 ).T
+
+
+def _amplitude(coefficients, h):
+    """Complex amplitude of exp(i h phi), from coefficients by the rotor basis on the last axis."""
+    if h == 0:
+        return coefficients[..., 0]
+    if 2 * h >= coefficients.shape[-1]:
+        return jnp.zeros(coefficients.shape[:-1], complex)
+    return coefficients[..., 2 * h - 1] - 1j * coefficients[..., 2 * h]
 
 
 def _contract(row, coefficients):

@@ -1,7 +1,8 @@
 """The direct solver: the nonlinear equations in time, every rotor turn resolved.
 
-Diffrax's Dopri8 with error control, in pieces of one second so that progress can be shown, a run
-can be stopped, and the step sequence does not depend on the output rate.
+Diffrax with error control, in pieces so that progress can be shown, a run can be stopped, and the
+step sequence does not depend on the output rate. The harmonic solver's slow motion is integrated
+here too, with the imbalance averaged over the rotors' turns.
 """
 
 from collections.abc import Callable
@@ -22,7 +23,6 @@ from quietbus.model.cmg import ClusterMoments
 from quietbus.model.satellite import Satellite
 from quietbus.spatial.rotation import quaternion_normalize
 
-PIECE = 1.0  # [s] integrated between two looks at the clock
 STEPS_PER_CALL = 4096  # at the most, so that a stiff run too can be watched and stopped
 SAME_INSTANT = 1e-9  # [s] instants closer than this are one
 
@@ -36,11 +36,26 @@ class Tolerances:
 
 
 @dataclass(frozen=True)
-class DirectSolution:
+class Scheme:
+    """What is integrated and how."""
+
+    averaged: bool = False  # the imbalance averaged over the rotors' turns
+    solver: type[diffrax.AbstractSolver] = diffrax.Dopri8
+    piece: float = 1.0  # [s] integrated between two looks at the clock
+    joint_forces: bool = False  # among the outputs
+    states: bool = False  # kept beside the outputs
+
+
+SLOW = Scheme(averaged=True, solver=diffrax.Tsit5, piece=25.0, states=True)
+
+
+@dataclass(frozen=True)
+class Solution:
     """A run, whole or up to where it stopped."""
 
     time: np.ndarray  # (n,) [s]
     outputs: Outputs  # NumPy arrays with time as the first axis
+    states: State | None  # likewise, if asked for
     final: State  # at the end of the last whole piece
     steps: int
     rejected: int
@@ -54,9 +69,9 @@ def integrate(
     duration: float,
     output_rate: float,
     tolerances: Tolerances | None = None,
-    with_joint_forces: bool = False,
+    scheme: Scheme | None = None,
     progress: Callable[[float], None] | None = None,
-) -> DirectSolution:
+) -> Solution:
     """Integrate from t = 0 to ``duration`` [s], with outputs every 1/``output_rate`` [Hz].
 
     A run that diverges or leaves the legs' geometry, and one that the user interrupts, returns
@@ -65,12 +80,12 @@ def integrate(
     Args:
         progress: called with the time reached [s] after every piece.
     """
-    tolerances = tolerances or Tolerances()
+    tolerances, scheme = tolerances or Tolerances(), scheme or Scheme()
     count = int(np.floor(duration * output_rate * (1.0 + 1e-12))) + 1
     time = np.arange(count) / output_rate
     finish = max(duration, time[-1])  # the last instant may lie a rounding past the duration
     # a power of two, so that output rates share compiled programs
-    size = max(64, 1 << (int(np.ceil(PIECE * output_rate)) + 1).bit_length())
+    size = max(64, 1 << (int(np.ceil(scheme.piece * output_rate)) + 1).bit_length())
     store: list[np.ndarray] = []
     state, t, done = initial, 0.0, 0
     steps = rejected = 0
@@ -78,13 +93,13 @@ def integrate(
     stopped, interrupted = None, False
     try:
         while t < finish and not stopped:
-            end = _end_of_piece(t, finish)
+            end = _end_of_piece(t, finish, scheme.piece)
             last = np.searchsorted(time, end, side="right" if end == finish else "left")
             due = time[done:last]
             ts = np.full(size, end)
             ts[: len(due)] = due
-            piece = _piece(satellite, state, t, end, step, ts, tolerances, with_joint_forces)
-            arrays = [np.asarray(leaf) for leaf in jax.tree.leaves(piece.outputs)]
+            piece = _piece(satellite, state, t, end, step, ts, tolerances, scheme)
+            arrays = [np.asarray(leaf) for leaf in jax.tree.leaves(piece.kept)]
             if not store:
                 store = [np.empty((count, *leaf.shape[1:])) for leaf in arrays]
             valid = int(np.sum(np.asarray(piece.valid)[: len(due)]))
@@ -103,19 +118,19 @@ def integrate(
         stopped, interrupted = f"interrupted by the user at t = {t:g} s", True
     if not store:
         raise KeyboardInterrupt
-    structure = jax.tree.structure(piece.outputs)
+    structure = jax.tree.structure(piece.kept)
     kept = jax.tree.unflatten(structure, [whole[:done] for whole in store])
-    return DirectSolution(time[:done], kept, state, steps, rejected, stopped, interrupted)
+    return Solution(time[:done], *kept, state, steps, rejected, stopped, interrupted)
 
 
-def _end_of_piece(t: float, finish: float) -> float:
-    """The next whole second, or the finish where little would be left after that."""
-    end = PIECE * (np.floor(t / PIECE + SAME_INSTANT) + 1.0)
+def _end_of_piece(t: float, finish: float, piece: float) -> float:
+    """The end of the piece begun, or the finish where little would be left after that."""
+    end = piece * (np.floor(t / piece + SAME_INSTANT) + 1.0)
     return finish if end > finish - 1e-6 else float(end)
 
 
 class _Piece(eqx.Module):
-    outputs: Outputs
+    kept: tuple[Outputs, State | None]
     valid: Array  # which output instants were reached
     final: State
     time_reached: Float[Array, ""]
@@ -125,16 +140,18 @@ class _Piece(eqx.Module):
     rejected: Array
 
 
-def _piece(satellite, state, t0, t1, step, ts, tolerances, with_joint_forces) -> _Piece:
+def _piece(satellite, state, t0, t1, step, ts, tolerances, scheme) -> _Piece:
     numbers = (t0, t1, step, ts, tolerances.relative, tolerances.absolute)
     arrays = tuple(jnp.asarray(number) for number in numbers)
-    return jax.block_until_ready(_compiled_piece(satellite, state, arrays, with_joint_forces))
+    return jax.block_until_ready(_compiled_piece(satellite, state, arrays, scheme))
 
 
 @eqx.filter_jit
-def _compiled_piece(satellite, state, numbers, with_joint_forces) -> _Piece:
+def _compiled_piece(satellite, state, numbers, scheme) -> _Piece:
     t0, t1, step, ts, rtol, atol = numbers
     moments = ClusterMoments.expand(satellite.cluster)
+    if scheme.averaged:
+        moments = moments.averaged()
     y0, unravel = ravel_pytree(state)
 
     @jax.jit  # traced once for the integrator's many uses of it
@@ -151,7 +168,7 @@ def _compiled_piece(satellite, state, numbers, with_joint_forces) -> _Piece:
         controller = diffrax.ClipStepSizeController(controller, jump_ts=jumps)
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(rate),
-        diffrax.Dopri8(),
+        scheme.solver(),
         t0,
         t1,
         jnp.minimum(step, t1 - t0),
@@ -169,11 +186,11 @@ def _compiled_piece(satellite, state, numbers, with_joint_forces) -> _Piece:
     ended = (solution.result == diffrax.RESULTS.successful) | (
         solution.result == diffrax.RESULTS.max_steps_reached
     )
-    states = jax.vmap(unravel)(saved)
-    reported = jax.vmap(lambda t, s: outputs(satellite, t, _tidy(satellite, s), with_joint_forces))
+    states = jax.vmap(lambda y: _tidy(satellite, unravel(y)))(saved)
+    reported = jax.vmap(lambda t, s: outputs(satellite, t, s, scheme.joint_forces))(ts, states)
     final = _tidy(satellite, unravel(last))
     return _Piece(
-        outputs=reported(ts, states),
+        kept=(reported, states if scheme.states else None),
         valid=valid,
         final=final,
         time_reached=time_reached,

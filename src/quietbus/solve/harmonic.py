@@ -1,0 +1,397 @@
+"""The harmonic solver: the slow motion in time, and at every instant the steady jitter about it.
+
+The slow motion is integrated with the rotors' imbalance averaged over their turns. At each output
+instant the response to every order of every rotor follows from one complex linear solve with the
+equations of small vibration about the slow motion (``dynamics.vibration``).
+
+The legs' part of these equations costs most and changes least. It is computed at chosen instants,
+so densely that linear interpolation between them is exact to ``LEG_ERROR``.
+"""
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.flatten_util import ravel_pytree
+
+from quietbus.dynamics.equations import body_mass_matrix
+from quietbus.dynamics.state import State
+from quietbus.dynamics.vibration import (
+    Vibration,
+    View,
+    equal_speeds,
+    leg_coefficients,
+    linear_outputs,
+    motion_amplitudes,
+    rotor_response,
+    slow_motion,
+    vibration,
+)
+from quietbus.model.cmg import ORDERS, ClusterMoments
+from quietbus.model.satellite import Satellite
+from quietbus.solve.direct import SLOW, Solution, Tolerances, integrate
+from quietbus.spatial.rotation import (
+    quaternion_multiply,
+    quaternion_to_matrix,
+    rotation_vector_to_quaternion,
+)
+
+TOLERANCES = Tolerances(1e-7, 1e-9)  # of the slow motion
+LEG_ERROR = 1e-7  # allowed in the dynamic stiffness at rotor frequency, over its inertia
+INSTANTS = 128  # responses per call, so that progress can be shown and a run stopped
+LEG_INSTANTS = 16  # linearisations of the legs per call
+SPACING = 64  # instants between the legs' first linearisations
+LOOKS = 32  # instants at the most at which the modes are computed
+SLOW_CHANGE = 0.05  # largest estimated error of the jitter that needs no warning
+ON_A_MODE = 1e-8  # relative distance from a mode at which the response counts as infinite
+
+
+class ResonanceError(ValueError):
+    """An order of a rotor lies on an undamped mode, where no steady response exists."""
+
+
+@dataclass(frozen=True)
+class Jitter:
+    """Steady response to each order of each rotor along a motion.
+
+    A deviation is ``Re(sum amplitude * exp(1j * h * phi))`` over rotors and orders, where
+    ``phi = rotor_phase + rotor_speed * t``.
+    """
+
+    amplitudes: dict[str, np.ndarray]  # (n, cmg, order, ...) by output, complex
+    change_error: np.ndarray  # (n,) estimated relative error of the assumption of slow change
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class HarmonicSolution:
+    """A harmonic run, whole or up to where it stopped."""
+
+    slow: Solution
+    jitter: Jitter
+
+
+def integrate_harmonic(
+    satellite: Satellite,
+    initial: State,
+    duration: float,
+    output_rate: float,
+    *,
+    steady: bool = False,
+    view: View | None = None,
+    tolerances: Tolerances = TOLERANCES,
+    progress: Callable[[float], None] | None = None,
+) -> HarmonicSolution:
+    """Slow motion and jitter from t = 0 to ``duration`` [s], every 1/``output_rate`` [Hz].
+
+    Args:
+        initial: the true state at t = 0, jitter included; if ``steady``, that of the slow motion.
+        view: points and lines of sight at which to give the jitter too.
+        progress: called with the time reached [s], first of the slow motion (counted half), then
+            of the jitter.
+
+    Raises:
+        ResonanceError: an order of a rotor lies on an undamped mode.
+    """
+    view = view or View(np.zeros((0, 3)), np.zeros((0, 3)))
+    half = progress and (lambda t: progress(0.5 * t))
+    if not steady:
+        initial = on_periodic_solution(satellite, initial, -1.0)
+    slow = integrate(satellite, initial, duration, output_rate, tolerances, SLOW, half)
+    second = progress and (lambda t: progress(0.5 * (slow.time[-1] + t)))
+    if slow.stopped and not slow.interrupted:
+        slow = replace(slow, stopped=f"{slow.stopped}. {_growth(satellite, slow)}".strip())
+    jitter, done = respond(satellite, slow.time, slow.states, view, second)
+    if done < len(slow.time):
+        slow = _cut(slow, done)
+    return HarmonicSolution(slow, jitter)
+
+
+def _cut(slow: Solution, count: int) -> Solution:
+    first = lambda tree: jax.tree.map(lambda leaf: leaf[:count], tree)  # noqa: E731
+    time = slow.time[:count]
+    said = f"interrupted by the user; jitter is known up to t = {time[-1]:g} s"
+    return replace(
+        slow,
+        time=time,
+        outputs=first(slow.outputs),
+        states=first(slow.states),
+        stopped=said,
+        interrupted=True,
+    )
+
+
+def _growth(satellite: Satellite, slow: Solution) -> str:
+    """Which mode grows where the slow motion went wrong."""
+    final = jax.tree.map(lambda leaf: np.asarray(leaf)[None], slow.final)
+    at = _Along(satellite, np.array([slow.time[-1]]), final)
+    (eigenvalues,) = at.eigenvalues(np.array([0]), _NOTHING_SEEN).values()
+    return _growing(eigenvalues, 0.0)
+
+
+def on_periodic_solution(satellite: Satellite, state: State, sign: float = 1.0) -> State:
+    """The state at t = 0 with the steady jitter added (``sign`` 1) or taken away (-1)."""
+    states = jax.tree.map(lambda leaf: np.asarray(leaf)[None], state)
+    along = _Along(satellite, np.zeros(1), states)
+    amplitudes, _ = along.chunk(np.zeros(1, int), _NOTHING_SEEN)
+    phase = np.asarray(satellite.cluster.rotor_phase)[:, None] * np.array(ORDERS)
+    turned = np.exp(1j * phase)[..., None]
+    now = {
+        name: sign * np.sum((amplitudes[name][0] * turned).real, axis=(0, 1))
+        for name in ("pose", "pose_rate", "memory")
+    }
+    return _displaced(state, now["pose"], now["pose_rate"], now["memory"])
+
+
+def _displaced(state: State, pose, pose_rate, memory) -> State:
+    """The state moved by small (r_P, theta_P, r_B, theta_B), their rates, and gimbals' motion."""
+    R_NB, R_NP = quaternion_to_matrix(state.q_NB), quaternion_to_matrix(state.q_NP)
+    r_P, theta_P, r_B, theta_B = pose.reshape(4, 3) @ R_NB.T
+    v_P, w_P, v_B, w_B = pose_rate.reshape(4, 3) @ R_NB.T
+    turned = lambda q, R, theta: quaternion_multiply(  # noqa: E731
+        q, rotation_vector_to_quaternion(R.T @ theta)
+    )
+    n = len(state.gimbal_angle)
+    angle, rate, integral = memory[:n], memory[n : 2 * n], memory[2 * n :]
+    return State(
+        p_NB_N=state.p_NB_N + r_B,
+        q_NB=turned(state.q_NB, R_NB, theta_B),
+        p_NP_N=state.p_NP_N + r_P,
+        q_NP=turned(state.q_NP, R_NP, theta_P),
+        v_NB_N=state.v_NB_N + v_B,
+        w_NB_B=state.w_NB_B + R_NB.T @ w_B,
+        v_NP_N=state.v_NP_N + v_P,
+        w_NP_P=state.w_NP_P + R_NP.T @ w_P,
+        gimbal_angle=state.gimbal_angle + angle,
+        gimbal_rate=state.gimbal_rate + rate,
+        error_integral=state.error_integral + integral,
+    )
+
+
+def respond(
+    satellite: Satellite,
+    time: np.ndarray,
+    states: State,
+    view: View,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[Jitter, int]:
+    """Jitter along a slow motion, and for how many instants it was computed before Ctrl-C.
+
+    Args:
+        time: (n,) [s].
+        states: of the slow motion, with time as the first axis.
+    """
+    along = _Along(satellite, time, states)
+    amplitudes: dict[str, np.ndarray] = {}
+    looks = np.unique(np.linspace(0, len(time) - 1, LOOKS).astype(int))
+    modes: dict[int, np.ndarray] = {}
+    done = 0
+    try:
+        for start in range(0, len(time), INSTANTS):
+            these = np.arange(start, min(start + INSTANTS, len(time)))
+            values, small = along.chunk(these, view)
+            for name, value in values.items():
+                whole = amplitudes.setdefault(
+                    name, np.empty((len(time), *value.shape[1:]), value.dtype)
+                )
+                whole[these] = value
+            modes |= _eigenvalues(small, start, np.intersect1d(looks, these))
+            done = int(these[-1]) + 1
+            if progress is not None:
+                progress(float(time[done - 1]))
+    except KeyboardInterrupt:
+        if not done:
+            raise
+    amplitudes = {name: value[:done] for name, value in amplitudes.items()}
+    _refuse_resonance(satellite, time, modes)
+    rates = np.abs(np.asarray(states.gimbal_rate))[:done]
+    error = _change_error(satellite, time[:done], amplitudes["bus_rate"], rates, modes)
+    said = []
+    if error.size and np.max(error) > SLOW_CHANGE:
+        worst = int(np.argmax(error))
+        said.append(
+            f"the operating point moves fast against the damping of the nearest mode: at t = "
+            f"{time[worst]:.4g} s the jitter may be wrong by {100 * error[worst]:.2g} % "
+            f"(estimated; above {100 * SLOW_CHANGE:g} % use method 'direct')"
+        )
+    last = modes[max(modes)]
+    growing = _growing(last, 1.0 / max(float(time[-1]), 1e-9))
+    if growing:
+        said.append(f"the slow motion is unstable: {growing}")
+    for inner in ("pose", "pose_rate", "memory"):
+        del amplitudes[inner]
+    return Jitter(amplitudes, error, tuple(said)), done
+
+
+class _Along:
+    """Responses at instants of a slow motion; the legs' linearisation sampled as far as needed."""
+
+    def __init__(self, satellite: Satellite, time: np.ndarray, states: State):
+        self.satellite, self.time, self.states = satellite, time, states
+        self.equal_speed = equal_speeds(satellite)
+        speeds = np.abs(np.asarray(satellite.cluster.rotor_speed))
+        self.slowest = float(np.min(speeds[speeds > 0.0], initial=np.inf))
+        self.known: dict[int, np.ndarray] = {}
+        self.inertia = np.ones(12)
+        self._sample_legs()
+
+    def chunk(self, instants: np.ndarray, view: View) -> tuple[dict[str, np.ndarray], Vibration]:
+        """Complex amplitudes (instant, cmg, order, ...) and the equations that they solve."""
+        t, states = self._at(instants, INSTANTS if len(self.time) > 1 else 1)
+        legs = self._legs(instants)
+        legs = np.concatenate([legs, np.repeat(legs[-1:], len(t) - len(legs), axis=0)])
+        result = _compiled_chunk(self.satellite, t, states, legs, view, self.equal_speed)
+        return jax.tree.map(lambda leaf: np.asarray(leaf)[: len(instants)], result)
+
+    def eigenvalues(self, instants: np.ndarray, view: View) -> dict[int, np.ndarray]:
+        """Of the controlled satellite, at instants of one chunk."""
+        _, small = self.chunk(instants, view)
+        return _eigenvalues(small, int(instants[0]), instants)
+
+    def _at(self, instants, size):
+        """Time and states at instants, the last one repeated to a size that programs share."""
+        padded = np.concatenate([instants, np.repeat(instants[-1:], size - len(instants))])
+        return self.time[padded], jax.tree.map(lambda leaf: leaf[padded], self.states)
+
+    def _sample_legs(self):
+        """Linearise the legs at so many instants that interpolation is good (see the module)."""
+        last = len(self.time) - 1
+        edges = np.unique(np.append(np.arange(0, last, SPACING), last))
+        self._linearize(edges)
+        open_ = [(a, b) for a, b in itertools.pairwise(edges) if b - a > 1]
+        while open_:
+            middles = [(a + b) // 2 for a, b in open_]
+            guess = [self._between(a, b, m) for (a, b), m in zip(open_, middles, strict=True)]
+            self._linearize(np.array(middles))
+            open_ = [
+                part
+                for (a, b), m, guessed in zip(open_, middles, guess, strict=True)
+                if self._error(guessed - self.known[m]) > LEG_ERROR
+                for part in ((a, m), (m, b))
+                if part[1] - part[0] > 1
+            ]
+        self.nodes = np.array(sorted(self.known))
+        self.values = np.stack([self.known[node] for node in self.nodes])
+
+    def _linearize(self, instants):
+        for start in range(0, len(instants), LEG_INSTANTS):
+            these = instants[start : start + LEG_INSTANTS]
+            size = LEG_INSTANTS if len(self.time) > 1 else 1
+            values, inertia = _compiled_legs(self.satellite, *self._at(these, size))
+            self.inertia = np.asarray(inertia)[0]
+            self.known |= zip(these.tolist(), np.asarray(values), strict=False)
+
+    def _between(self, a, b, m):
+        part = (m - a) / (b - a)
+        return (1.0 - part) * self.known[a] + part * self.known[b]
+
+    def _error(self, difference) -> float:
+        """Size of a change of the legs' coefficients against the inertia forces of the jitter."""
+        M, by_pose, by_speed = difference[: 3 * 144].reshape(3, 12, 12)
+        w = self.slowest
+        change = np.abs(M) + np.abs(by_speed) / w + np.abs(by_pose) / w**2
+        return float(np.max(change / np.sqrt(np.outer(self.inertia, self.inertia))))
+
+    def _legs(self, instants):
+        right = np.clip(np.searchsorted(self.nodes, instants), 1, max(len(self.nodes) - 1, 1))
+        if len(self.nodes) == 1:
+            return self.values[np.zeros(len(instants), int)]
+        left = right - 1
+        span = self.nodes[right] - self.nodes[left]
+        part = ((instants - self.nodes[left]) / span)[:, None]
+        return (1.0 - part) * self.values[left] + part * self.values[right]
+
+
+_NOTHING_SEEN = View(np.zeros((0, 3)), np.zeros((0, 3)))
+
+
+@eqx.filter_jit
+def _compiled_legs(satellite, t, states):
+    """The legs' coefficients as one row per instant, and the inertia of the bodies (12,)."""
+    averaged = ClusterMoments.expand(satellite.cluster).averaged()
+
+    def one(t, state):
+        slow = slow_motion(satellite, t, state, averaged)
+        still = jnp.zeros_like(state.gimbal_angle)
+        carried = averaged.at(state.gimbal_angle, still, still, still)
+        inertia = jnp.diag(body_mass_matrix(satellite, slow.plates, carried))
+        return ravel_pytree(leg_coefficients(satellite, slow))[0], inertia
+
+    return jax.vmap(one)(t, states)
+
+
+@eqx.filter_jit
+def _compiled_chunk(satellite, t, states, legs, view, equal_speed):
+    moments = ClusterMoments.expand(satellite.cluster)
+    averaged = moments.averaged()
+    s = 1j * moments.rotor_speed[:, None] * jnp.array(ORDERS)
+
+    def one(t, state, row):
+        slow = slow_motion(satellite, t, state, averaged)
+        example = jax.eval_shape(lambda: leg_coefficients(satellite, slow))
+        _, unravel = ravel_pytree(jax.tree.map(lambda leaf: jnp.zeros(leaf.shape), example))
+        small = vibration(satellite, slow, moments, unravel(row))
+        xi = rotor_response(small, moments, equal_speed)
+        views = jax.vmap(jax.vmap(lambda s, x: linear_outputs(satellite, small, s, x, view)))
+        motions = jax.vmap(jax.vmap(lambda s, x: motion_amplitudes(small, s, x)))
+        return views(s, xi) | motions(s, xi), small
+
+    return jax.vmap(one)(t, states, legs)
+
+
+def _eigenvalues(small: Vibration, start: int, looks: np.ndarray) -> dict[int, np.ndarray]:
+    """Eigenvalues [rad/s] of the controlled satellite at instants of a chunk."""
+    at = lambda look: jax.tree.map(lambda leaf: leaf[look - start], small)  # noqa: E731
+    return {int(look): np.linalg.eigvals(at(look).state_matrix()) for look in looks}
+
+
+def _refuse_resonance(satellite, time, modes):
+    speeds = np.asarray(satellite.cluster.rotor_speed)
+    for look, eigenvalues in modes.items():
+        for j, speed in enumerate(speeds):
+            for h in ORDERS:
+                distance = np.min(np.abs(1j * h * speed - eigenvalues))
+                if speed != 0.0 and distance < ON_A_MODE * abs(h * speed):
+                    raise ResonanceError(
+                        f"order {h} of rotor {j} ({abs(h * speed) / (2 * np.pi):.6g} Hz) lies on "
+                        f"an undamped mode of the satellite at t = {time[look]:g} s: the steady "
+                        "jitter would be infinite. Give the struts damping, or change the "
+                        "rotor's speed"
+                    )
+
+
+def _change_error(satellite, time, bus_rate, gimbal_rates, modes) -> np.ndarray:
+    """Estimated relative error of the jitter's quasi-steady amplitude (n,).
+
+    An amplitude that changes at the rate a lags behind by ``a / |i h Omega - lambda|``, lambda the
+    nearest eigenvalue (docs/theory.md, section 14). a is the larger of the gimbal's rate and what
+    the amplitudes show from instant to instant.
+    """
+    size = np.linalg.norm(bus_rate, axis=3)  # (n, cmg, order)
+    rate = np.broadcast_to(gimbal_rates[:, :, None], size.shape)
+    if len(time) > 1:
+        change = np.linalg.norm(np.diff(bus_rate, axis=0), axis=3) / np.diff(time)[:, None, None]
+        change = np.maximum(np.append(change, change[-1:], 0), np.append(change[:1], change, 0))
+        rate = np.maximum(rate, change / np.maximum(size, 1e-300))
+    s = 1j * np.asarray(satellite.cluster.rotor_speed)[:, None] * np.array(ORDERS)
+    looks = np.array(sorted(modes))
+    distances = np.stack([np.min(np.abs(s[..., None] - modes[look]), axis=-1) for look in looks])
+    nearest = np.argmin(np.abs(np.arange(len(time))[:, None] - looks), axis=1)
+    lag = rate / np.maximum(distances[nearest], 1e-300)
+    total = np.sum(size, axis=(1, 2))
+    return np.sum(lag * size, axis=(1, 2)) / np.where(total > 0.0, total, 1.0)
+
+
+def _growing(eigenvalues: np.ndarray, least: float) -> str:
+    """The fastest growing mode in words, or nothing if none grows faster than ``least`` [1/s]."""
+    fastest = eigenvalues[np.argmax(eigenvalues.real)]
+    if fastest.real <= max(least, 1e-9 * np.max(np.abs(eigenvalues))):
+        return ""
+    return (
+        f"a mode at {abs(fastest.imag) / (2 * np.pi):.4g} Hz grows, e-fold in "
+        f"{1 / fastest.real:.3g} s"
+    )
