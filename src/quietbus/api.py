@@ -14,13 +14,17 @@ from numpy.typing import ArrayLike
 from quietbus.build import build_initial_state, build_satellite
 from quietbus.dynamics.linearize import Actuator, LinearModel, OperatingPoint
 from quietbus.dynamics.linearize import linearize as linearize_satellite
+from quietbus.dynamics.vibration import View
+from quietbus.jitter_study import JitterStudy
 from quietbus.results import aliasing, to_dataset
 from quietbus.scenario import Scenario, load_scenario
 from quietbus.solve.direct import Scheme, Tolerances, integrate
+from quietbus.solve.harmonic import integrate_harmonic, on_periodic_solution
 from quietbus.study import Study
 
 Mount = Literal["isolated", "rigid"]
-METHODS = ("direct",)
+METHODS = ("direct", "harmonic")
+HARMONIC_RATE = 10.0  # [Hz] of the outputs of a harmonic run, unless asked for otherwise
 
 
 class QuietbusWarning(UserWarning):
@@ -41,17 +45,26 @@ def simulate(
     mount: Mount | None = None,
     *,
     duration: float | None = None,
+    output_rate: float | None = None,
     joint_forces: bool = False,
+    points: Mapping[str, ArrayLike] | None = None,
+    lines_of_sight: Mapping[str, ArrayLike] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> xr.Dataset:
     """Simulate a scenario.
 
     Args:
         scenario: a scenario, the path of a scenario file, or a built-in's name.
-        method: "direct": the nonlinear equations, every rotor turn resolved.
+        method: "direct": the nonlinear equations, every rotor turn resolved. "harmonic": the slow
+            motion, and at every output instant the steady response to every order of every rotor.
         mount: "isolated" or "rigid", instead of the scenario's own.
         duration: [s], instead of the scenario's own.
-        joint_forces: also give the constraint forces in the legs' joints (isolated mount only).
+        output_rate: [Hz], instead of the scenario's own (direct) or 10 Hz (harmonic).
+        joint_forces: also give the constraint forces in the legs' joints (direct, isolated mount).
+        points: (3,) points of the bus [m], bus frame, by name, where the jitter of the
+            acceleration is wanted (harmonic).
+        lines_of_sight: (3,) directions, bus frame, by name, of which the jitter is wanted
+            (harmonic).
         progress: called with the simulated time reached [s].
 
     Returns:
@@ -61,16 +74,25 @@ def simulate(
     Raises:
         ScenarioError: the scenario is not valid.
         ValueError: an unknown method or mount.
+        ResonanceError: an order of a rotor lies on an undamped mode (harmonic).
         SimulationError: the run diverged; what was computed until then is in its ``run``.
         KeyboardInterrupt: Ctrl-C before anything was computed.
     """
     if method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}; got {method!r}")
-    scenario = _as_run(scenario, mount, duration)
-    warning = aliasing(scenario)
-    if warning:
-        warnings.warn(warning, QuietbusWarning, stacklevel=2)
-    run = _direct(scenario, joint_forces, progress)
+    if method == "harmonic":
+        if joint_forces:
+            raise ValueError("joint_forces needs method 'direct'")
+        scenario = _as_run(scenario, mount, duration, output_rate or HARMONIC_RATE)
+        run, notes = _harmonic(scenario, points or {}, lines_of_sight or {}, progress)
+    else:
+        if points or lines_of_sight:
+            raise ValueError("points and lines_of_sight need method 'harmonic'")
+        scenario = _as_run(scenario, mount, duration, output_rate)
+        notes = tuple(filter(None, [aliasing(scenario)]))
+        run = _direct(scenario, joint_forces, progress)
+    for note in notes:
+        warnings.warn(note, QuietbusWarning, stacklevel=2)
     if run.attrs["status"] == "stopped":
         raise SimulationError(run.attrs["stop_reason"], run)
     if run.attrs["status"] == "interrupted":
@@ -135,6 +157,26 @@ def analyze(scenario: Scenario | str, gimbal_angle: ArrayLike | None = None) -> 
     return Study(scenario, _gimbal_angles(scenario, gimbal_angle))
 
 
+def jitter(scenario: Scenario | str, gimbal_angle: ArrayLike | None = None) -> JitterStudy:
+    """Jitter with the satellite at rest, with the isolator and without, in milliseconds.
+
+    Args:
+        scenario: a scenario, the path of a scenario file, or a built-in's name.
+        gimbal_angle: (cmg,) [rad] instead of the scenario's own.
+
+    Returns:
+        The study: amplitudes by rotor and order, combined figures, budget by kind of imbalance,
+        worst gimbal angles, derivatives; ``to_dict()`` gives it all (docs/jitter.md).
+
+    Raises:
+        ScenarioError: the scenario is not valid.
+        ValueError: a wrong number of gimbal angles, or a satellite that cannot rest.
+        ResonanceError: an order of a rotor lies on an undamped mode.
+    """
+    scenario = _as_run(scenario, None, None)
+    return JitterStudy(scenario, _gimbal_angles(scenario, gimbal_angle))
+
+
 def linearize(
     scenario: Scenario | str,
     rate: ArrayLike | None = None,
@@ -187,13 +229,22 @@ def _vector(name: str, value: ArrayLike, size: int) -> np.ndarray:
     return vector
 
 
-def _as_run(scenario: Scenario | str, mount: Mount | None, duration: float | None) -> Scenario:
+def _as_run(
+    scenario: Scenario | str,
+    mount: Mount | None,
+    duration: float | None,
+    output_rate: float | None = None,
+) -> Scenario:
     """The scenario with what the caller asks for instead of its own values."""
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
     if mount not in (None, "isolated", "rigid"):
         raise ValueError(f"mount must be 'isolated' or 'rigid', got {mount!r}")
-    wanted = {"isolator.mount": mount, "simulation.duration": duration}
+    wanted = {
+        "isolator.mount": mount,
+        "simulation.duration": duration,
+        "simulation.output_rate": output_rate,
+    }
     return scenario.with_overrides({k: v for k, v in wanted.items() if v is not None})
 
 
@@ -208,9 +259,12 @@ def _direct(
     started = time.perf_counter()
     satellite = build_satellite(scenario)
     settings = scenario.simulation
+    state = build_initial_state(scenario, satellite)
+    if scenario.initial.steady:
+        state = on_periodic_solution(satellite, state)
     solution = integrate(
         satellite,
-        build_initial_state(scenario, satellite),
+        state,
         settings.duration,
         settings.output_rate,
         Tolerances(settings.tolerances.relative, settings.tolerances.absolute),
@@ -218,3 +272,35 @@ def _direct(
         progress,
     )
     return to_dataset(scenario, solution, time.perf_counter() - started)
+
+
+def _harmonic(
+    scenario: Scenario,
+    points: Mapping[str, ArrayLike],
+    lines_of_sight: Mapping[str, ArrayLike],
+    progress: Callable[[float], None] | None,
+) -> tuple[xr.Dataset, tuple[str, ...]]:
+    """The run, and what the user should know of it."""
+    at = [_vector(f"points[{name!r}]", p, 3) for name, p in points.items()]
+    along = [_vector(f"lines_of_sight[{name!r}]", d, 3) for name, d in lines_of_sight.items()]
+    for name, direction in zip(lines_of_sight, along, strict=True):
+        if not np.any(direction):
+            raise ValueError(f"lines_of_sight[{name!r}]: expected a direction, got zero")
+    view = View(
+        np.array(at).reshape(-1, 3),
+        np.array([d / np.linalg.norm(d) for d in along]).reshape(-1, 3),
+    )
+    started = time.perf_counter()
+    satellite = build_satellite(scenario)
+    solution = integrate_harmonic(
+        satellite,
+        build_initial_state(scenario, satellite),
+        scenario.simulation.duration,
+        scenario.simulation.output_rate,
+        steady=scenario.initial.steady,
+        view=view,
+        progress=progress,
+    )
+    wall_time = time.perf_counter() - started
+    run = to_dataset(scenario, solution, wall_time, points, lines_of_sight)
+    return run, solution.jitter.warnings

@@ -6,14 +6,20 @@ import importlib.metadata
 import os
 import pathlib
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy.interpolate import make_interp_spline
 
+from quietbus.analysis.jitter import combine
 from quietbus.analysis.residual import residual, shows
+from quietbus.model.cmg import ORDERS
 from quietbus.scenario import Scenario
-from quietbus.solve.direct import DirectSolution
+from quietbus.solve.direct import SLOW, Scheme, Solution
+from quietbus.solve.harmonic import TOLERANCES, HarmonicSolution, Jitter
 
 AXES = ("x", "y", "z")
 _DIMENSIONS = {
@@ -60,10 +66,50 @@ JOINT_VARIABLES = {
     "universal_moment": (("leg",), "N m", "base on leg at the universal joint, about its h axis"),
     "universal_axis": (("leg", "axis"), "1", "axis of the universal moment, inertial frame"),
 }
+# of harmonic runs; name: (dimensions of a component, unit, meaning)
+JITTER_VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
+    "bus_rate": VARIABLES["bus_rate"],
+    "bus_attitude": (("axis",), "rad", "rotation of the bus from its slow motion, bus frame"),
+    "platform_rate": VARIABLES["platform_rate"],
+    "leg_stroke": VARIABLES["leg_stroke"],
+    "leg_force": VARIABLES["leg_force"],
+    "point_acceleration": (
+        ("point", "axis"),
+        "m/s^2",
+        "inertial acceleration of a point of the bus, bus frame",
+    ),
+    "line_of_sight": (
+        ("line", "axis"),
+        "rad",
+        "motion of a line of sight, across it, bus frame",
+    ),
+}
+COMBINED = {
+    "envelope": "largest value as lines beat, phases as given",
+    "worst_case": "sum of all amplitudes, any phases",
+    "rss": "root of the sum of squares of all amplitudes",
+    "rms": "root mean square in time, phases as given",
+}
 
 
-def to_dataset(scenario: Scenario, solution: DirectSolution, wall_time: float) -> xr.Dataset:
-    """A direct run as a dataset; ``scenario`` as it was run, mount included."""
+def to_dataset(
+    scenario: Scenario,
+    solution: Solution | HarmonicSolution,
+    wall_time: float,
+    points: Mapping[str, Any] | None = None,
+    lines_of_sight: Mapping[str, Any] | None = None,
+) -> xr.Dataset:
+    """A run as a dataset.
+
+    Args:
+        scenario: as it was run, mount and output rate included.
+        wall_time: [s].
+        points, lines_of_sight: what a harmonic run looked at, by name.
+    """
+    jitter = solution.jitter if isinstance(solution, HarmonicSolution) else None
+    tolerances: Any = scenario.simulation.tolerances
+    if isinstance(solution, HarmonicSolution):
+        solution, tolerances = solution.slow, TOLERANCES
     data = {
         name: _variable(getattr(solution.outputs, name), *VARIABLES[name]) for name in VARIABLES
     }
@@ -73,6 +119,8 @@ def to_dataset(scenario: Scenario, solution: DirectSolution, wall_time: float) -
             name: _variable(getattr(joints, name), *description)
             for name, description in JOINT_VARIABLES.items()
         }
+    if jitter is not None:
+        data |= _jitter_variables(scenario, jitter)
     counted = {"cmg": solution.outputs.gimbal_angle, "leg": solution.outputs.leg_stroke}
     coordinates = {
         "time": ("time", solution.time, {"units": "s", "long_name": "time"}),
@@ -85,19 +133,24 @@ def to_dataset(scenario: Scenario, solution: DirectSolution, wall_time: float) -
             for name, values in counted.items()
         },
     }
-    tolerances = scenario.simulation.tolerances
+    if jitter is not None:
+        coordinates["order"] = ("order", list(ORDERS), {"long_name": "multiple of rotor speed"})
+        for dimension, named in (("point", points), ("line", lines_of_sight)):
+            if named:
+                coordinates[dimension] = (dimension, list(named), {"long_name": dimension})
     status = (
         "interrupted" if solution.interrupted else "stopped" if solution.stopped else "complete"
     )
+    scheme = Scheme() if jitter is None else SLOW
     attributes = {
         "title": f"{scenario.name}, {scenario.isolator.mount}",
         "scenario": scenario.to_yaml(),
         "mount": scenario.isolator.mount,
-        "method": "direct",
+        "method": "direct" if jitter is None else "harmonic",
         "status": status,
         "stop_reason": solution.stopped or "",
         "quietbus_version": importlib.metadata.version("quietbus"),
-        "solver": f"diffrax {importlib.metadata.version('diffrax')} Dopri8",
+        "solver": f"diffrax {importlib.metadata.version('diffrax')} {scheme.solver.__name__}",
         "relative_tolerance": tolerances.relative,
         "absolute_tolerance": tolerances.absolute,
         "steps": solution.steps,
@@ -106,6 +159,103 @@ def to_dataset(scenario: Scenario, solution: DirectSolution, wall_time: float) -
         "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
     }
     return xr.Dataset(data, coordinates, attributes)
+
+
+def _jitter_variables(scenario: Scenario, jitter: Jitter) -> dict[str, Any]:
+    """Amplitudes, phases and what combines them, of every output that has components."""
+    speed, phase = _rotors(scenario)
+    frequency, angle = np.outer(speed, ORDERS), np.outer(phase, ORDERS)
+    data = {
+        "jitter_change_error": _variable(
+            jitter.change_error, (), "1", "estimated error of the jitter by the motion's change"
+        )
+    }
+    for name, (inner, unit, meaning) in JITTER_VARIABLES.items():
+        values = jitter.amplitudes[name]
+        if not values.size:
+            continue
+        of = f"jitter of the {meaning}"
+        dimensions = ("cmg", "order", *inner)
+        data[f"{name}_jitter_amplitude"] = _variable(
+            np.abs(values), dimensions, unit, f"{of}: amplitude"
+        )
+        data[f"{name}_jitter_phase"] = _variable(
+            np.angle(values), dimensions, "rad", f"{of}: phase against order times rotor angle"
+        )
+        flat = values.reshape(*values.shape[:3], -1)
+        combined = combine(flat, frequency, angle)
+        for kind, said in COMBINED.items():
+            whole = getattr(combined, kind).reshape(len(values), *values.shape[3:])
+            data[f"{name}_jitter_{kind}"] = _variable(whole, inner, unit, f"{of}: {said}")
+    return data
+
+
+def _rotors(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
+    """Speeds [rad/s] and phases [rad] of the rotors; zero where a unit has no rotor."""
+    units = scenario.cluster.placed()
+    speed = np.array([unit.rotor.speed if unit.rotor else 0.0 for unit in units])
+    phase = np.array(scenario.cluster.rotor_phases or np.zeros(len(units)))
+    return speed, phase
+
+
+def reconstruct(
+    run: xr.Dataset,
+    name: str = "bus_rate",
+    around: float | None = None,
+    span: float = 0.1,
+    rate: float | None = None,
+) -> xr.DataArray:
+    """The time signal of a harmonic run's output, every rotor turn resolved.
+
+    Args:
+        run: of method "harmonic".
+        name: an output of which the run holds ``NAME_jitter_amplitude``.
+        around: middle of the stretch [s]; by default its end is the run's.
+        span: its length [s]; cut where the run begins or ends.
+        rate: samples per second [Hz]; by default 40 per period of the fastest line.
+
+    Returns:
+        Slow motion and jitter together, or the jitter alone of what is only known as a deviation
+        (``bus_attitude``, ``line_of_sight``, ``point_acceleration``; see its ``long_name``).
+
+    Raises:
+        ValueError: a run that is not harmonic, an unknown name, or times outside the run.
+    """
+    known = [n.removesuffix("_jitter_phase") for n in run if str(n).endswith("_jitter_phase")]
+    if name not in known:
+        raise ValueError(
+            f"the run has no jitter of {name!r}; "
+            + (f"it has that of {', '.join(known)}" if known else "its method is not 'harmonic'")
+        )
+    time = run["time"].to_numpy()
+    around = float(time[-1] - span / 2) if around is None else around
+    if not time[0] <= around <= time[-1] or not span > 0.0:
+        raise ValueError(
+            f"expected a stretch of positive length around a time from {time[0]:g} s to "
+            f"{time[-1]:g} s; got {span:g} s around {around:g} s"
+        )
+    speed, phase = _rotors(scenario_of(run))
+    fastest = max(ORDERS) * np.max(np.abs(speed)) / (2.0 * np.pi)
+    rate = rate or 40.0 * max(fastest, 1.0)
+    first, last = max(time[0], around - span / 2), min(time[-1], around + span / 2)
+    t = first + np.arange(int((last - first) * rate) + 1) / rate
+    amplitude, shift = (run[f"{name}_jitter_{part}"] for part in ("amplitude", "phase"))
+    at = _interpolated(time, amplitude.to_numpy() * np.exp(1j * shift.to_numpy()), t)
+    turn = np.exp(1j * (phase + np.outer(t, speed))[..., None] * np.array(ORDERS))
+    inner = amplitude.dims[3:]
+    values = np.sum((at * turn.reshape(*turn.shape, *[1] * len(inner))).real, axis=(1, 2))
+    meaning = f"jitter of {JITTER_VARIABLES[name][2]}"
+    if name in run and run[name].dims[1:] == inner:
+        values, meaning = values + _interpolated(time, run[name].to_numpy(), t), VARIABLES[name][2]
+    coordinates = {"time": t} | {d: run[d] for d in inner if d in run.coords}
+    attributes = {"units": amplitude.attrs["units"], "long_name": meaning}
+    return xr.DataArray(values, coordinates, ("time", *inner), name, attributes)
+
+
+def _interpolated(time, values, t):
+    if len(time) == 1:
+        return np.repeat(values, len(t), axis=0)
+    return make_interp_spline(time, values, k=min(3, len(time) - 1))(t)
 
 
 def _variable(values, dimensions, unit, meaning):
@@ -180,7 +330,13 @@ def summarize(run: xr.Dataset) -> Summary:
     error = np.linalg.norm(run["attitude_error"].to_numpy(), axis=1)
     jitter = rms = slow = None
     note = "not shown: the output rate is too low for the rotors"
-    if not aliasing(scenario_of(run)):
+    if run.attrs["method"] == "harmonic":
+        last = time >= time[-1] - 1.0
+        jitter = run["bus_rate_jitter_envelope"].to_numpy()[last].max(axis=0)
+        rms = run["bus_rate_jitter_rms"].to_numpy()[last].max(axis=0)
+        slow = np.abs(run["bus_rate"].to_numpy()[last]).max(axis=0)
+        note = f"envelope from t = {time[last][0]:.4g} s to {time[-1]:.4g} s"
+    elif not aliasing(scenario_of(run)):
         try:
             rest = residual(time, run["bus_rate"].to_numpy())
             jitter, rms, slow = rest.jitter_peak, rest.jitter_rms, rest.slow

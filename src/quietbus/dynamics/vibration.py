@@ -197,7 +197,8 @@ class Vibration(eqx.Module):
         control = self.control
         m = control.by_angle.shape[1]
         pad = np.zeros((m + 3, n - 3))
-        by_pose = control.by_attitude + control.by_rate @ np.asarray(self.turning)
+        turning = np.cross(self.slow.plates.w_B, np.eye(3)).T
+        by_pose = control.by_attitude + control.by_rate @ turning
         decided = np.hstack(
             [
                 pad,
@@ -328,6 +329,9 @@ class View(eqx.Module):
     line_of_sight_B: Float[Array, "line 3"]  # [-] unit vectors
 
 
+NOTHING_SEEN = View(np.zeros((0, 3)), np.zeros((0, 3)))
+
+
 def linear_outputs(
     satellite: Satellite,
     small: Vibration,
@@ -355,20 +359,3 @@ def linear_outputs(
         "point_acceleration": rotate(turning @ turning, point),
         "line_of_sight": cross(theta_B, view.line_of_sight_B),
     }
-
-
-def motion_amplitudes(
-    small: Vibration, s: Complex[Array, ""], xi: Complex[Array, "12"]
-) -> dict[str, Complex[Array, "..."]]:
-    """What of the state vibrates in one response: xi, its rate, and the gimbals with the integral.
-
-    The rates are those of the vectors, not of their components; ``memory`` holds gimbal angles,
-    their rates and the integral, all still if the gimbals are held.
-    """
-    n = len(small.slow.gimbal[0])
-    rate = xi.reshape(4, 3) @ (s * jnp.eye(3) + small.turning).T
-    memory = jnp.zeros(2 * n + 3, complex)
-    if small.control is not None:
-        moved = small.memory(s) @ xi[9:]
-        memory = jnp.concatenate([moved[:n], s * moved[:n], moved[n:]])
-    return {"pose": xi, "pose_rate": rate.reshape(12), "memory": memory}

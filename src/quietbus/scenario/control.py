@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import BeforeValidator, Discriminator, Tag, model_validator
+from pydantic import BeforeValidator, Discriminator, StrictBool, Tag, model_validator
 
 from quietbus.scenario.base import (
     ZERO,
@@ -146,10 +146,20 @@ class Control(Part):
 
 
 class Initial(Part):
-    """Attitude and rate of the whole satellite at the start."""
+    """Attitude and rate of the whole satellite at the start.
+
+    ``steady``: these are the slow motion's, and the rotors' steady jitter comes on top, so that
+    the imbalance causes no transient. Otherwise all parts start with exactly these.
+    """
 
     attitude: Vector[Angle] = ZERO  # [roll, pitch, yaw]
     rate: Vector[AngularVelocity] = ZERO  # bus frame
+    steady: StrictBool = False
+
+    @model_validator(mode="before")
+    @classmethod
+    def _steady_word(cls, data: Any) -> Any:
+        return {"steady": True} if data == "steady" else data
 
 
 class EigenaxisSlew(Part):

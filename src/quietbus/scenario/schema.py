@@ -63,6 +63,12 @@ def _none_word(value: Any) -> Any:
     return None if value == "none" else value
 
 
+def _keys(path: str) -> list[str | int]:
+    """A dotted path as keys and indices."""
+    parts = re.findall(r"[^.\[\]]+", path) or [""]
+    return [int(key) if key.isdigit() else key for key in parts]
+
+
 def _without_nulls(data: Any) -> Any:
     if isinstance(data, dict):
         return {key: _without_nulls(value) for key, value in data.items() if value is not None}
@@ -142,10 +148,26 @@ class Scenario(Part):
             self._set(data, path, value)
         return self.from_dict(data, source=f"{self.name} with overrides")
 
+    def number(self, path: str) -> float:
+        """The number [SI] at a dotted path, as of ``with_overrides``.
+
+        Raises:
+            ScenarioError: the scenario has no such entry, or it is not one number.
+        """
+        value: Any = self.to_dict()
+        for key in _keys(path):
+            try:
+                value = value[key]
+            except (KeyError, IndexError, TypeError):
+                value = None
+                break
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            said = "is not in the scenario" if value is None else "is not one number"
+            raise ScenarioError(self.name, [Problem(said, tuple(_keys(path)))])
+        return float(value)
+
     def _set(self, data: Any, path: str, value: Any) -> None:
-        keys: list[str | int] = [
-            int(key) if key.isdigit() else key for key in re.findall(r"[^.\[\]]+", path) or [""]
-        ]
+        keys = _keys(path)
         for depth, key in enumerate(keys):
             inner = isinstance(data, dict) and isinstance(key, str)
             if not inner and not (isinstance(data, list) and key in range(len(data))):

@@ -21,12 +21,12 @@ from jax.flatten_util import ravel_pytree
 from quietbus.dynamics.equations import body_mass_matrix
 from quietbus.dynamics.state import State
 from quietbus.dynamics.vibration import (
+    NOTHING_SEEN,
     Vibration,
     View,
     equal_speeds,
     leg_coefficients,
     linear_outputs,
-    motion_amplitudes,
     rotor_response,
     slow_motion,
     vibration,
@@ -41,11 +41,11 @@ from quietbus.spatial.rotation import (
 )
 
 TOLERANCES = Tolerances(1e-7, 1e-9)  # of the slow motion
-LEG_ERROR = 1e-7  # allowed in the dynamic stiffness at rotor frequency, over its inertia
+LEG_ERROR = 1e-6  # allowed in the dynamic stiffness at rotor frequency, over its inertia
 INSTANTS = 128  # responses per call, so that progress can be shown and a run stopped
 LEG_INSTANTS = 16  # linearisations of the legs per call
 SPACING = 64  # instants between the legs' first linearisations
-LOOKS = 32  # instants at the most at which the modes are computed
+LOOKS = 16  # instants at the most at which the modes are computed
 SLOW_CHANGE = 0.05  # largest estimated error of the jitter that needs no warning
 ON_A_MODE = 1e-8  # relative distance from a mode at which the response counts as infinite
 
@@ -82,7 +82,7 @@ def integrate_harmonic(
     output_rate: float,
     *,
     steady: bool = False,
-    view: View | None = None,
+    view: View = NOTHING_SEEN,
     tolerances: Tolerances = TOLERANCES,
     progress: Callable[[float], None] | None = None,
 ) -> HarmonicSolution:
@@ -97,7 +97,6 @@ def integrate_harmonic(
     Raises:
         ResonanceError: an order of a rotor lies on an undamped mode.
     """
-    view = view or View(np.zeros((0, 3)), np.zeros((0, 3)))
     half = progress and (lambda t: progress(0.5 * t))
     if not steady:
         initial = on_periodic_solution(satellite, initial, -1.0)
@@ -128,35 +127,53 @@ def _cut(slow: Solution, count: int) -> Solution:
 def _growth(satellite: Satellite, slow: Solution) -> str:
     """Which mode grows where the slow motion went wrong."""
     final = jax.tree.map(lambda leaf: np.asarray(leaf)[None], slow.final)
-    at = _Along(satellite, np.array([slow.time[-1]]), final)
-    (eigenvalues,) = at.eigenvalues(np.array([0]), _NOTHING_SEEN).values()
-    return _growing(eigenvalues, 0.0)
+    along = _Along(satellite, np.array([slow.time[-1]]), final)
+    _, _, small = along.chunk(np.zeros(1, int), NOTHING_SEEN)
+    return _growing(_eigenvalues(small, 0, np.zeros(1, int))[0], 0.0)
 
 
 def on_periodic_solution(satellite: Satellite, state: State, sign: float = 1.0) -> State:
     """The state at t = 0 with the steady jitter added (``sign`` 1) or taken away (-1)."""
     states = jax.tree.map(lambda leaf: np.asarray(leaf)[None], state)
     along = _Along(satellite, np.zeros(1), states)
-    amplitudes, _ = along.chunk(np.zeros(1, int), _NOTHING_SEEN)
-    phase = np.asarray(satellite.cluster.rotor_phase)[:, None] * np.array(ORDERS)
-    turned = np.exp(1j * phase)[..., None]
-    now = {
-        name: sign * np.sum((amplitudes[name][0] * turned).real, axis=(0, 1))
-        for name in ("pose", "pose_rate", "memory")
-    }
-    return _displaced(state, now["pose"], now["pose_rate"], now["memory"])
+    _, xi, small = along.chunk(np.zeros(1, int), NOTHING_SEEN)
+    small = jax.tree.map(lambda leaf: leaf[0], small)
+    angle = rate = np.zeros(len(state.gimbal_angle))
+    pose = pose_rate = np.zeros(12)
+    integral = np.zeros(3)
+    turning = np.asarray(small.turning)
+    for j, (phase, speed) in enumerate(_rotors(satellite)):
+        for order, h in enumerate(ORDERS):
+            s, now = 1j * h * speed, sign * xi[0, j, order] * np.exp(1j * h * phase)
+            pose = pose + now.real
+            pose_rate = pose_rate + (now.reshape(4, 3) @ (s * np.eye(3) + turning).T).real.ravel()
+            if small.control is not None and speed != 0.0:
+                moved = np.asarray(small.memory(s)) @ now[9:]
+                angle = angle + moved[:-3].real
+                rate = rate + (s * moved[:-3]).real
+                integral = integral + moved[-3:].real
+    return _displaced(state, pose, pose_rate, angle, rate, integral)
 
 
-def _displaced(state: State, pose, pose_rate, memory) -> State:
-    """The state moved by small (r_P, theta_P, r_B, theta_B), their rates, and gimbals' motion."""
+def _rotors(satellite: Satellite) -> list[tuple[float, float]]:
+    """Phase [rad] and speed [rad/s] of each rotor."""
+    cluster = satellite.cluster
+    return list(
+        zip(
+            *(np.asarray(v).tolist() for v in (cluster.rotor_phase, cluster.rotor_speed)),
+            strict=True,
+        )
+    )
+
+
+def _displaced(state: State, pose, pose_rate, angle, rate, integral) -> State:
+    """The state moved by small (r_P, theta_P, r_B, theta_B) along bus axes and by the others."""
     R_NB, R_NP = quaternion_to_matrix(state.q_NB), quaternion_to_matrix(state.q_NP)
     r_P, theta_P, r_B, theta_B = pose.reshape(4, 3) @ R_NB.T
     v_P, w_P, v_B, w_B = pose_rate.reshape(4, 3) @ R_NB.T
     turned = lambda q, R, theta: quaternion_multiply(  # noqa: E731
         q, rotation_vector_to_quaternion(R.T @ theta)
     )
-    n = len(state.gimbal_angle)
-    angle, rate, integral = memory[:n], memory[n : 2 * n], memory[2 * n :]
     return State(
         p_NB_N=state.p_NB_N + r_B,
         q_NB=turned(state.q_NB, R_NB, theta_B),
@@ -193,7 +210,7 @@ def respond(
     try:
         for start in range(0, len(time), INSTANTS):
             these = np.arange(start, min(start + INSTANTS, len(time)))
-            values, small = along.chunk(these, view)
+            values, _, small = along.chunk(these, view)
             for name, value in values.items():
                 whole = amplitudes.setdefault(
                     name, np.empty((len(time), *value.shape[1:]), value.dtype)
@@ -207,7 +224,8 @@ def respond(
         if not done:
             raise
     amplitudes = {name: value[:done] for name, value in amplitudes.items()}
-    _refuse_resonance(satellite, time, modes)
+    for look, eigenvalues in modes.items():
+        refuse_resonance(satellite, f"at t = {time[look]:g} s", eigenvalues)
     rates = np.abs(np.asarray(states.gimbal_rate))[:done]
     error = _change_error(satellite, time[:done], amplitudes["bus_rate"], rates, modes)
     said = []
@@ -222,8 +240,6 @@ def respond(
     growing = _growing(last, 1.0 / max(float(time[-1]), 1e-9))
     if growing:
         said.append(f"the slow motion is unstable: {growing}")
-    for inner in ("pose", "pose_rate", "memory"):
-        del amplitudes[inner]
     return Jitter(amplitudes, error, tuple(said)), done
 
 
@@ -246,11 +262,6 @@ class _Along:
         legs = np.concatenate([legs, np.repeat(legs[-1:], len(t) - len(legs), axis=0)])
         result = _compiled_chunk(self.satellite, t, states, legs, view, self.equal_speed)
         return jax.tree.map(lambda leaf: np.asarray(leaf)[: len(instants)], result)
-
-    def eigenvalues(self, instants: np.ndarray, view: View) -> dict[int, np.ndarray]:
-        """Of the controlled satellite, at instants of one chunk."""
-        _, small = self.chunk(instants, view)
-        return _eigenvalues(small, int(instants[0]), instants)
 
     def _at(self, instants, size):
         """Time and states at instants, the last one repeated to a size that programs share."""
@@ -280,8 +291,7 @@ class _Along:
     def _linearize(self, instants):
         for start in range(0, len(instants), LEG_INSTANTS):
             these = instants[start : start + LEG_INSTANTS]
-            size = LEG_INSTANTS if len(self.time) > 1 else 1
-            values, inertia = _compiled_legs(self.satellite, *self._at(these, size))
+            values, inertia = _compiled_legs(self.satellite, *self._at(these, LEG_INSTANTS))
             self.inertia = np.asarray(inertia)[0]
             self.known |= zip(these.tolist(), np.asarray(values), strict=False)
 
@@ -304,9 +314,6 @@ class _Along:
         span = self.nodes[right] - self.nodes[left]
         part = ((instants - self.nodes[left]) / span)[:, None]
         return (1.0 - part) * self.values[left] + part * self.values[right]
-
-
-_NOTHING_SEEN = View(np.zeros((0, 3)), np.zeros((0, 3)))
 
 
 @eqx.filter_jit
@@ -337,8 +344,7 @@ def _compiled_chunk(satellite, t, states, legs, view, equal_speed):
         small = vibration(satellite, slow, moments, unravel(row))
         xi = rotor_response(small, moments, equal_speed)
         views = jax.vmap(jax.vmap(lambda s, x: linear_outputs(satellite, small, s, x, view)))
-        motions = jax.vmap(jax.vmap(lambda s, x: motion_amplitudes(small, s, x)))
-        return views(s, xi) | motions(s, xi), small
+        return views(s, xi), xi, small
 
     return jax.vmap(one)(t, states, legs)
 
@@ -349,19 +355,22 @@ def _eigenvalues(small: Vibration, start: int, looks: np.ndarray) -> dict[int, n
     return {int(look): np.linalg.eigvals(at(look).state_matrix()) for look in looks}
 
 
-def _refuse_resonance(satellite, time, modes):
-    speeds = np.asarray(satellite.cluster.rotor_speed)
-    for look, eigenvalues in modes.items():
-        for j, speed in enumerate(speeds):
-            for h in ORDERS:
-                distance = np.min(np.abs(1j * h * speed - eigenvalues))
-                if speed != 0.0 and distance < ON_A_MODE * abs(h * speed):
-                    raise ResonanceError(
-                        f"order {h} of rotor {j} ({abs(h * speed) / (2 * np.pi):.6g} Hz) lies on "
-                        f"an undamped mode of the satellite at t = {time[look]:g} s: the steady "
-                        "jitter would be infinite. Give the struts damping, or change the "
-                        "rotor's speed"
-                    )
+def refuse_resonance(satellite: Satellite, where: str, eigenvalues: np.ndarray) -> None:
+    """Raise ResonanceError if an order of a rotor lies on an undamped mode.
+
+    Args:
+        where: which operating point, for the message.
+        eigenvalues: of the controlled satellite [rad/s].
+    """
+    for j, speed in enumerate(np.asarray(satellite.cluster.rotor_speed)):
+        for h in ORDERS:
+            distance = np.min(np.abs(1j * h * speed - eigenvalues))
+            if speed != 0.0 and distance < ON_A_MODE * abs(h * speed):
+                raise ResonanceError(
+                    f"order {h} of rotor {j} ({abs(h * speed) / (2 * np.pi):.6g} Hz) lies on an "
+                    f"undamped mode of the satellite {where}: the steady jitter would be "
+                    "infinite. Give the struts damping, or change the rotor's speed"
+                )
 
 
 def _change_error(satellite, time, bus_rate, gimbal_rates, modes) -> np.ndarray:

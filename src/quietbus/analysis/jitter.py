@@ -1,0 +1,175 @@
+"""Jitter at one operating point, of each rotor, of each kind of imbalance, and of all together."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Complex, Float
+from scipy.optimize import differential_evolution
+from scipy.stats import qmc
+
+from quietbus.dynamics.closed_loop import initial_state
+from quietbus.dynamics.vibration import (
+    NOTHING_SEEN,
+    Vibration,
+    leg_coefficients,
+    linear_outputs,
+    rotor_response,
+    slow_motion,
+    vibration,
+)
+from quietbus.model.cmg import ORDERS, ClusterMoments
+from quietbus.model.guidance import StepGuidance
+from quietbus.model.satellite import Satellite
+
+SAME_FREQUENCY = 1e-9  # relative: lines closer than this are one
+
+
+@dataclass(frozen=True)
+class Combined:
+    """Amplitudes of all orders of all rotors as one number for each output component.
+
+    Without axes of rotors and orders, otherwise as what was combined, in its unit.
+    """
+
+    envelope: np.ndarray  # phases as given: what the sum reaches as lines of other frequency beat
+    worst_case: np.ndarray  # any phases: the sum of all amplitudes
+    rss: np.ndarray  # root of the sum of squares of all amplitudes
+    rms: np.ndarray  # root mean square in time, phases as given
+
+
+def combine(amplitude: np.ndarray, frequency: np.ndarray, phase: np.ndarray) -> Combined:
+    """Combine lines.
+
+    Lines of one frequency add with their phases; those of different frequencies beat, so that
+    sooner or later their amplitudes add. (Lines at exactly n-fold frequencies keep their phase to
+    each other and may never reach the envelope, which then is an upper bound.)
+
+    Args:
+        amplitude: (..., cmg, order, component) complex; the line is Re(amplitude exp(i angle)).
+        frequency: (cmg, order) d(angle)/dt [rad/s], of either sign.
+        phase: (cmg, order) angle at t = 0 [rad].
+    """
+    amplitude, frequency = np.asarray(amplitude), np.asarray(frequency)
+    size = np.abs(amplitude)
+    turned = amplitude * np.exp(1j * np.asarray(phase))[..., None]
+    turned = np.where((frequency < 0.0)[..., None], turned.conj(), turned)
+    lines = np.stack([turned[..., mask, :].sum(axis=-2) for mask in _groups(np.abs(frequency))])
+    return Combined(
+        envelope=np.sum(np.abs(lines), axis=0),
+        worst_case=np.sum(size, axis=(-3, -2)),
+        rss=np.sqrt(np.sum(size**2, axis=(-3, -2))),
+        rms=np.sqrt(0.5 * np.sum(np.abs(lines) ** 2, axis=0)),
+    )
+
+
+def _groups(frequency: np.ndarray) -> list[np.ndarray]:
+    """Masks (cmg, order) of lines of one frequency."""
+    ascending = np.unique(frequency)
+    new = np.diff(ascending, prepend=-np.inf) > SAME_FREQUENCY * ascending
+    new[0] = True
+    starts = ascending[new]
+    member = np.searchsorted(starts, frequency, side="right") - 1
+    return [member == i for i in range(len(starts))]
+
+
+def steady_jitter(
+    satellite: Satellite, gimbal_angle: Float[Array, " cmg"]
+) -> tuple[dict[str, Complex[Array, "cmg order ..."]], Vibration]:
+    """Amplitudes of the outputs (``dynamics.vibration.linear_outputs``) with the satellite at rest.
+
+    The satellite is at its target, its plate in the nominal pose, no load acts; ``rest_error``
+    tells whether that is an equilibrium. Also the equations that the amplitudes solve.
+    """
+    unit = jnp.array([1.0, 0.0, 0.0, 0.0])
+    satellite = replace(satellite, guidance=StepGuidance(unit), loads=())
+    state = initial_state(satellite, unit, jnp.zeros(3), gimbal_angle)
+    moments = ClusterMoments.expand(satellite.cluster)
+    slow = slow_motion(satellite, jnp.zeros(()), state, moments.averaged())
+    small = vibration(satellite, slow, moments, leg_coefficients(satellite, slow))
+    xi = rotor_response(small, moments, tuple(range(len(gimbal_angle))))
+    s = 1j * moments.rotor_speed[:, None] * jnp.array(ORDERS)
+    outputs = jax.vmap(jax.vmap(lambda s, x: linear_outputs(satellite, small, s, x, NOTHING_SEEN)))
+    return outputs(s, xi), small
+
+
+def rest_error(small: Vibration) -> float:
+    """Largest acceleration [m/s^2, rad/s^2] of the satellite at rest: 0 at an equilibrium."""
+    return float(np.max(np.abs(small.slow.u_rate)))
+
+
+KINDS = ("static imbalance", "dynamic imbalance", "installation error", "asymmetry and products")
+
+
+def imbalance_kinds(satellite: Satellite) -> list[Satellite]:
+    """The satellite with static imbalance only, dynamic only, and both without installation error.
+
+    ``budget`` makes the parts of a budget of their jitter.
+    """
+    cluster = satellite.cluster
+    speed_axes = jnp.broadcast_to(jnp.eye(3), cluster.R_GF.shape)
+    inertia = cluster.I_RRcm_R
+    transverse = 0.5 * (inertia[:, 1, 1] + inertia[:, 2, 2])
+    even = jax.vmap(jnp.diag)(jnp.stack([inertia[:, 0, 0], transverse, transverse], axis=1))
+    products = inertia.at[:, 1, 2].set(0.0).at[:, 2, 1].set(0.0)
+    products = products - jax.vmap(jnp.diag)(jnp.diagonal(inertia, axis1=1, axis2=2)) + even
+    none = jnp.zeros_like(cluster.eccentricity)
+    return [
+        replace(satellite, cluster=replace(cluster, **changes))
+        for changes in (
+            {"R_GF": speed_axes, "I_RRcm_R": even},
+            {"R_GF": speed_axes, "I_RRcm_R": products, "eccentricity": none},
+            {"R_GF": speed_axes},
+        )
+    ]
+
+
+def budget(
+    whole: np.ndarray, static: np.ndarray, dynamic: np.ndarray, installed_exactly: np.ndarray
+) -> np.ndarray:
+    """Parts of the complex amplitudes by kind (kind, ...), in the order of ``KINDS``.
+
+    Their sum is ``whole``. What the installation error changes is its part; what is left is due to
+    the rotor's unequal transverse inertias and to products of both imbalances.
+    """
+    return np.stack(
+        [static, dynamic, whole - installed_exactly, installed_exactly - static - dynamic]
+    )
+
+
+@dataclass(frozen=True)
+class WorstAngles:
+    """Gimbal angles at which jitter is largest."""
+
+    gimbal_angle: np.ndarray  # (cmg,) [rad], within -pi to pi
+    value: float  # what was sought, there
+    evaluations: int
+
+
+def worst_angles(measure: Callable[[np.ndarray], np.ndarray], count: int) -> WorstAngles:
+    """Search all gimbal angles for the largest value of a measure.
+
+    Differential evolution from a Sobol sample, always with the same seed.
+
+    Args:
+        measure: of (SEARCHED, count) angles at once, (SEARCHED,).
+        count: number of CMGs.
+    """
+    start = qmc.scale(qmc.Sobol(count, seed=1).random(SEARCHED), -np.pi, np.pi)
+    found = differential_evolution(
+        lambda angles: -measure(angles.T),
+        [(-np.pi, np.pi)] * count,
+        init=start,
+        maxiter=120,
+        tol=1e-6,
+        seed=1,
+        polish=False,
+        vectorized=True,
+        updating="deferred",
+    )
+    return WorstAngles(found.x, -float(found.fun), SEARCHED * int(found.nfev))
+
+
+SEARCHED = 64  # sets of gimbal angles looked at together

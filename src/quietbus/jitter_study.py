@@ -1,0 +1,303 @@
+"""Jitter of a scenario at one operating point (``quietbus jitter``)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.metadata import version
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from quietbus.analysis.channels import json_ready
+from quietbus.analysis.jitter import (
+    KINDS,
+    SEARCHED,
+    Combined,
+    WorstAngles,
+    budget,
+    combine,
+    imbalance_kinds,
+    rest_error,
+    steady_jitter,
+    worst_angles,
+)
+from quietbus.build import build_satellite
+from quietbus.dynamics.vibration import Vibration
+from quietbus.model.cmg import ORDERS
+from quietbus.model.satellite import Satellite
+from quietbus.scenario import Scenario, ScenarioError
+from quietbus.solve.harmonic import refuse_resonance
+
+MOUNTS = ("isolated", "rigid")
+AT_REST = 1e-6  # [m/s^2, rad/s^2] accelerations smaller than this are none
+ARCSEC = np.rad2deg(1.0) * 3600.0
+# differences of the scenario's algebra: offsets in steps and weights
+_CENTRAL = ((-3, -2, -1, 1, 2, 3), np.array([-1, 9, -45, 45, -9, 1]) / 60.0)
+_FORWARD = ((0, 1, 2, 3, 4), np.array([-25, 48, -36, 16, -3]) / 12.0)
+
+
+@dataclass(frozen=True)
+class JitterStudy:
+    """Jitter of the satellite at rest, at given gimbal angles, with the isolator and without.
+
+    Parts are made when asked for. Amplitudes are complex, those of
+    ``Re(amplitude exp(i h phi))`` at order h of a rotor at angle phi; axes are those of the bus.
+
+    Raises:
+        ValueError: the satellite cannot rest in the nominal pose (preloaded struts).
+        ResonanceError: an order of a rotor lies on an undamped mode.
+    """
+
+    scenario: Scenario
+    gimbal_angle: np.ndarray  # (cmg,) [rad]
+
+    def __post_init__(self) -> None:
+        for mount in MOUNTS:
+            small = jax.tree.map(lambda leaf: leaf[0], self._at_rest[mount][1])
+            error = rest_error(small)
+            if error > AT_REST:
+                raise ValueError(
+                    "jitter is analysed at rest in the nominal pose, which is no equilibrium "
+                    f"here: the {mount} satellite accelerates by {error:.3g} (SI). Take the "
+                    "struts' preload away (isolator.legs.free_length), or use `quietbus simulate "
+                    "--method harmonic`"
+                )
+            modes = np.linalg.eigvals(small.state_matrix())
+            refuse_resonance(self.satellite(mount), f"with mount {mount}", modes)
+
+    def satellite(self, mount: str) -> Satellite:
+        """Parameters of the model."""
+        return self._satellites[mount]
+
+    @cached_property
+    def _satellites(self) -> dict[str, Satellite]:
+        return {mount: build_satellite(self.scenario, mount) for mount in MOUNTS}  # type: ignore[arg-type]
+
+    @cached_property
+    def frequency(self) -> np.ndarray:
+        """(cmg, order) [rad/s]."""
+        return np.outer(self.satellite("isolated").cluster.rotor_speed, ORDERS)
+
+    @cached_property
+    def _at_rest(self) -> dict[str, tuple[dict[str, np.ndarray], Vibration]]:
+        return {
+            mount: _compute([self.satellite(mount)], self.gimbal_angle[None]) for mount in MOUNTS
+        }
+
+    @cached_property
+    def outputs(self) -> dict[str, dict[str, np.ndarray]]:
+        """Amplitudes (cmg, order, ...) by mount and output."""
+        return {
+            mount: {name: values[0] for name, values in outputs.items()}
+            for mount, (outputs, _) in self._at_rest.items()
+        }
+
+    def bus_rate(self, mount: str) -> np.ndarray:
+        """Amplitudes (cmg, order, axis) [rad/s]."""
+        return self.outputs[mount]["bus_rate"]
+
+    def combined(self, mount: str, output: str = "bus_rate") -> Combined:
+        """All rotors and orders together, in the output's unit."""
+        values = self.outputs[mount][output]
+        phase = np.outer(self.satellite(mount).cluster.rotor_phase, ORDERS)
+        return combine(values, self.frequency, phase)
+
+    @cached_property
+    def budget(self) -> dict[str, np.ndarray]:
+        """Parts of the bus rate's amplitudes (kind, cmg, order, axis) [rad/s] by mount."""
+        parts = {}
+        for mount in MOUNTS:
+            variants = imbalance_kinds(self.satellite(mount))
+            values = jitter_of_designs(variants, self.gimbal_angle)["bus_rate"]
+            parts[mount] = budget(self.bus_rate(mount), *values)
+        return parts
+
+    def worst(self, mount: str) -> WorstAngles:
+        """Gimbal angles with the largest ``worst_case_norm`` of the bus rate [rad/s]."""
+        same = [self.satellite(mount)] * SEARCHED
+        return worst_angles(
+            lambda angles: worst_case_norm(jitter_of_designs(same, angles)["bus_rate"]),
+            len(self.gimbal_angle),
+        )
+
+    def derivative(
+        self, paths: Sequence[str], mount: str, output: str = "bus_rate"
+    ) -> dict[str, np.ndarray]:
+        """Derivatives of the amplitudes (cmg, order, ...) by scenario parameters, in SI units.
+
+        The physics is differentiated automatically (JAX). How the model's parameters follow from
+        the scenario's is algebra in NumPy; its derivative along one parameter is a difference of
+        sixth order, exact to about 1e-12.
+
+        Args:
+            paths: dotted, as of ``Scenario.with_overrides``, of single numbers:
+                ``"isolator.legs.stiffness"``, ``"cluster.rotor.speed"``.
+
+        Raises:
+            ScenarioError: a path that the scenario does not have.
+            ValueError: what lies there is not one number.
+        """
+        satellite = self.satellite(mount)
+        ways = [self._way(path, mount) for path in paths]
+        stacked = jax.tree.map(lambda *each: jnp.stack(each), *ways)
+        values = _compiled_derivative(satellite, stacked, self.gimbal_angle, output)
+        return dict(zip(paths, np.asarray(values), strict=True))
+
+    def _way(self, path: str, mount: str) -> Satellite:
+        """Derivative of the satellite's parameters by a scenario parameter."""
+        value = self.scenario.number(path)
+        step = 1e-3 * (abs(value) or 1.0)
+
+        def parameters(offset: int) -> Any:
+            changed = self.scenario.with_overrides({path: value + offset * step})
+            satellite = build_satellite(changed, mount)  # type: ignore[arg-type]
+            return jax.tree.map(np.asarray, eqx.filter(satellite, eqx.is_array))
+
+        try:
+            offsets, weights = _CENTRAL
+            built = [parameters(offset) for offset in offsets]
+        except ScenarioError:  # at the end of what the scenario allows, zero say
+            offsets, weights = _FORWARD
+            built = [parameters(offset) for offset in offsets]
+        return jax.tree.map(
+            lambda *each: sum(w * leaf for w, leaf in zip(weights, each, strict=True)) / step,
+            *built,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON, with the keys of the interface; see docs/jitter.md."""
+        own = self.scenario.isolator.mount
+        size = {mount: np.abs(self.bus_rate(mount)) for mount in MOUNTS}
+        turn = {mount: np.abs(self.outputs[mount]["bus_attitude"]) for mount in MOUNTS}
+        orders = [
+            {
+                "cmg": j,
+                "order": h,
+                "frequency_hz": abs(self.frequency[j, k]) / (2.0 * np.pi),
+                "bus_rate_amplitude_deg_s": np.rad2deg(size[own][j, k]),
+                **{
+                    mount: {
+                        "bus_rate_amplitude_deg_s": np.rad2deg(size[mount][j, k]),
+                        "bus_attitude_amplitude_arcsec": ARCSEC * turn[mount][j, k],
+                    }
+                    for mount in MOUNTS
+                },
+                **ratio(size["isolated"][j, k], size["rigid"][j, k]),
+            }
+            for j in range(len(self.gimbal_angle))
+            for k, h in enumerate(ORDERS)
+        ]
+        together = {mount: self._combined_dict(mount) for mount in MOUNTS}
+        envelope = {mount: self.combined(mount).envelope for mount in MOUNTS}
+        worst = {}
+        for mount in MOUNTS:
+            found = self.worst(mount)
+            worst[mount] = {
+                "gimbal_angle_deg": np.rad2deg(found.gimbal_angle),
+                "bus_rate_norm_deg_s": np.rad2deg(found.value),
+                "bus_rate_norm_here_deg_s": np.rad2deg(
+                    worst_case_norm(self.bus_rate(mount)[None])[0]
+                ),
+                "evaluations": found.evaluations,
+            }
+        return json_ready(
+            {
+                "scenario": self.scenario.name,
+                "version": version("quietbus"),
+                "mount": own,
+                "gimbal_angle_deg": np.rad2deg(self.gimbal_angle),
+                "axes": ["x", "y", "z"],
+                "orders": orders,
+                "combined": together | ratio(envelope["isolated"], envelope["rigid"]),
+                "budget": {
+                    mount: [
+                        {
+                            "cmg": j,
+                            "kind": kind,
+                            "order": h,
+                            "bus_rate_amplitude_deg_s": np.rad2deg(np.abs(part[i, j, k])),
+                        }
+                        for i, kind in enumerate(KINDS)
+                        for j in range(len(self.gimbal_angle))
+                        for k, h in enumerate(ORDERS)
+                    ]
+                    for mount, part in self.budget.items()
+                },
+                "worst": worst,
+            }
+        )
+
+    def _combined_dict(self, mount: str) -> dict[str, Any]:
+        rate, turn = self.combined(mount), self.combined(mount, "bus_attitude")
+        kinds = ("envelope", "worst_case", "rss", "rms")
+        return {
+            **{f"bus_rate_{kind}_deg_s": np.rad2deg(getattr(rate, kind)) for kind in kinds},
+            **{f"bus_attitude_{kind}_arcsec": ARCSEC * getattr(turn, kind) for kind in kinds},
+        }
+
+
+def worst_case_norm(amplitude: np.ndarray) -> np.ndarray:
+    """Norm over the axes of the sum of all amplitudes, for amplitudes (n, cmg, order, axis)."""
+    return np.linalg.norm(np.sum(np.abs(amplitude), axis=(1, 2)), axis=-1)
+
+
+def ratio(isolated: np.ndarray, rigid: np.ndarray) -> dict[str, list[float | None]]:
+    """What the isolator leaves, per axis, in percent and dB; None where there is nothing."""
+    parts = [i / r if r > 0.0 else None for i, r in zip(isolated, rigid, strict=True)]
+    return {
+        "ratio_percent": [None if part is None else 100.0 * part for part in parts],
+        "ratio_db": [20.0 * float(np.log10(part)) if part else None for part in parts],
+    }
+
+
+def jitter_of_designs(
+    designs: Sequence[Satellite], gimbal_angle: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Amplitudes (design, cmg, order, ...) by output, of satellites alike but for their numbers.
+
+    Args:
+        designs: of the same mount, number of legs and CMGs, control and steering law.
+        gimbal_angle: (cmg,) [rad], or (design, cmg) for each its own.
+    """
+    return _compute(
+        designs, np.broadcast_to(gimbal_angle, (len(designs), *gimbal_angle.shape[-1:]))
+    )[0]
+
+
+def _compute(
+    designs: Sequence[Satellite], angles: np.ndarray
+) -> tuple[dict[str, np.ndarray], Vibration]:
+    """Amplitudes and the equations that they solve, in one program for any number of designs."""
+    parts = []
+    for start in range(0, len(designs), SEARCHED):
+        these = list(designs[start : start + SEARCHED])
+        missing = SEARCHED - len(these)
+        stacked = jax.tree.map(
+            lambda *each: np.stack(each) if eqx.is_array(each[0]) else each[0],
+            *these,
+            *these[-1:] * missing,
+        )
+        at = np.pad(angles[start : start + SEARCHED], ((0, missing), (0, 0)), mode="edge")
+        part = _compiled_designs(stacked, at)
+        parts.append(jax.tree.map(lambda leaf: np.asarray(leaf)[: len(these)], part))  # noqa: B023
+    return jax.tree.map(lambda *each: np.concatenate(each), *parts)
+
+
+@eqx.filter_jit
+def _compiled_designs(satellites, angles):
+    return eqx.filter_vmap(steady_jitter)(satellites, jnp.asarray(angles))
+
+
+@eqx.filter_jit
+def _compiled_derivative(satellite, ways, gimbal_angle, output):
+    arrays, rest = eqx.partition(satellite, eqx.is_array)
+
+    def amplitude(arrays):
+        satellite = eqx.combine(arrays, rest)
+        return steady_jitter(satellite, jnp.asarray(gimbal_angle))[0][output]
+
+    _, push = jax.linearize(amplitude, arrays)
+    return jax.vmap(push)(ways)
