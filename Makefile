@@ -1,16 +1,17 @@
 # make demo   the main job: the built-in satellite with its isolation platform and without
-# make test   lint, types, import layers and all tests
+# make test   lint, types, import layers, the documentation and all tests
+# make docs   the documentation as a site in site/; a warning is an error
 # make bench  speed against other engines, as ratios in one run
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint bench clean
+.PHONY: demo test lint docs bench clean
 
 demo: $(VENV)/installed
 	$(BIN)/quietbus compare zhang2012 --duration "60 s" --output out
 
-test: lint
+test: lint docs
 	$(BIN)/pytest -n 2 --dist loadfile
 
 lint: $(VENV)/developed
@@ -18,6 +19,9 @@ lint: $(VENV)/developed
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+docs: $(VENV)/developed
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 bench: $(VENV)/developed
 	@for each in benchmarks/*.py; do echo "== $$each"; $(BIN)/python $$each; done
@@ -33,4 +37,4 @@ $(VENV)/developed: $(VENV)/installed
 	@touch $@
 
 clean:
-	rm -rf $(VENV) out build dist
+	rm -rf $(VENV) out site build dist
