@@ -12,7 +12,7 @@ import signal
 import sys
 import tempfile
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from quietbus.scenario import Scenario
     from quietbus.study import Study
+    from quietbus.validate import Check
 
 BAD_INPUT, FAILED = 2, 1
 
@@ -239,6 +240,43 @@ def plot(
 
 
 @app.command()
+def report(
+    run: Annotated[Path, typer.Argument(metavar="RUN.nc", help="A run of `quietbus simulate`.")],
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="HTML file; default RUN's name, replaced if old."),
+    ] = None,
+    check: Annotated[
+        bool, typer.Option("--validate", help="Also check the run's scenario, as `validate` does.")
+    ] = False,
+) -> None:
+    """Write a run as one HTML page: numbers, interactive pictures, scenario, provenance."""
+    from quietbus.results import load_run, scenario_of
+
+    try:
+        loaded = load_run(run)
+    except (FileNotFoundError, ValueError) as error:
+        raise _BadInput(str(error)) from None
+    scenario = scenario_of(loaded)
+    page = output or run.with_suffix(".html")
+    _check_file(page)
+    if page.resolve() == run.resolve():
+        raise _BadInput(f"{page}: is the run itself; expected another name for the page")
+    try:
+        from quietbus.report import write_report
+
+        checks = _checks(scenario, None) if check else None
+    except ImportError as error:
+        _fail(str(error))
+    try:
+        write_report(loaded, page, checks)
+    except OSError as error:
+        _fail(f"{page}: cannot be written: {error.strerror or error}")
+    print(f"wrote {page}")
+    _fail_unless_passed(checks or [])
+
+
+@app.command()
 def validate(
     scenario: ScenarioArgument,
     export: Annotated[
@@ -250,26 +288,36 @@ def validate(
     checked = _load(scenario, mount, None)
     if export is not None:
         _check_file(export)
-    _import_heavy()
-    from quietbus import validate as checking
-    from quietbus.build import build_initial_state, build_satellite
     from quietbus.tables import checks_table
 
-    satellite = build_satellite(checked)
-    state = build_initial_state(checked, satellite)
     try:
-        if export is not None:
-            export.write_text(checking.write_mjcf(satellite, state), encoding="utf-8")
-            print(f"wrote {export}")
-        with _status() as tell:
-            checks = checking.validate(satellite, state, progress=tell)
+        checks = _checks(checked, export)
     except ImportError as error:
         _fail(str(error))
     _print(checks_table(f"{checked.name}, {checked.isolator.mount}", checks))
+    _fail_unless_passed(checks)
+    print(f"all {len(checks)} checks passed (errors are relative)")
+
+
+def _checks(scenario: Scenario, export: Path | None) -> list[Check]:
+    """Check a scenario, and write it as a MuJoCo model if wanted; ImportError without MuJoCo."""
+    _import_heavy()
+    from quietbus import validate as checking
+    from quietbus.build import build_initial_state, build_satellite
+
+    satellite = build_satellite(scenario)
+    state = build_initial_state(scenario, satellite)
+    if export is not None:
+        export.write_text(checking.write_mjcf(satellite, state), encoding="utf-8")
+        print(f"wrote {export}")
+    with _status() as tell:
+        return checking.validate(satellite, state, progress=tell)
+
+
+def _fail_unless_passed(checks: Sequence[Check]) -> None:
     failed = [check.name for check in checks if not check.passed]
     if failed:
         _fail(f"{len(failed)} of {len(checks)} checks failed: {', '.join(failed)}")
-    print(f"all {len(checks)} checks passed (errors are relative)")
 
 
 @app.command()
