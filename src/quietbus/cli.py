@@ -50,6 +50,7 @@ class Method(StrEnum):
     """How the motion is computed."""
 
     direct = "direct"
+    harmonic = "harmonic"
 
 
 ScenarioArgument = Annotated[
@@ -57,6 +58,10 @@ ScenarioArgument = Annotated[
 ]
 DurationOption = Annotated[
     str | None, typer.Option(help="Length of the run in s (or '2 min'), instead of the scenario's.")
+]
+AnglesOption = Annotated[
+    str | None,
+    typer.Option(help="'30 deg, -30 deg, ...' (or rad), instead of the scenario's."),
 ]
 FolderOption = Annotated[Path, typer.Option("-o", "--output", help="Folder for the results.")]
 
@@ -131,23 +136,33 @@ def simulate(
         Path | None,
         typer.Option("-o", "--output", help="NetCDF file; default NAME-MOUNT.nc, replaced if old."),
     ] = None,
-    method: Annotated[Method, typer.Option(help="How to compute the motion.")] = Method.direct,
+    method: Annotated[
+        Method, typer.Option(help="direct: every rotor turn; harmonic: slow motion and jitter.")
+    ] = Method.direct,
     mount: Annotated[Mount | None, typer.Option(help="Instead of the scenario's mount.")] = None,
     duration: DurationOption = None,
+    output_rate: Annotated[
+        str | None,
+        typer.Option(help="'200 Hz', instead of the scenario's (direct) or 10 Hz (harmonic)."),
+    ] = None,
     joint_forces: Annotated[
         bool, typer.Option("--joint-forces", help="Also keep the forces in the legs' joints.")
     ] = False,
 ) -> None:
     """Simulate a scenario; write the run and print what one wants to know of it."""
-    checked = _load(scenario, mount, duration)
+    checked = _load(scenario, mount, duration, output_rate)
     _import_heavy()
     from quietbus import api
     from quietbus.results import summarize
+    from quietbus.solve.harmonic import ResonanceError
     from quietbus.tables import summary_table
 
     chosen = checked.isolator.mount
-    output = output or Path(f"{re.sub(r'[^A-Za-z0-9._-]+', '-', checked.name)}-{chosen}.nc")
+    name = f"{re.sub(r'[^A-Za-z0-9._-]+', '-', checked.name)}-{chosen}"
+    output = output or Path(f"{name}-harmonic.nc" if method == Method.harmonic else f"{name}.nc")
     _check_file(output)
+    if joint_forces and method == Method.harmonic:
+        raise _BadInput("--joint-forces needs --method direct")
     if joint_forces and chosen == Mount.rigid:
         raise _BadInput("--joint-forces needs the isolated mount: a rigid one leaves them open")
     with _keeping_results():
@@ -156,11 +171,14 @@ def simulate(
                 run = api.simulate(
                     checked,
                     method.value,
+                    output_rate=checked.simulation.output_rate if output_rate else None,
                     joint_forces=joint_forces,
                     progress=lambda t: tell(chosen, t),
                 )
             except api.SimulationError as error:
                 run = error.run
+            except ResonanceError as error:
+                raise _BadInput(f"{scenario}: {error}") from None
         troubles = _save(run, output)
     if run.sizes["time"] > 1:
         _print(summary_table({chosen: summarize(run)}))
@@ -327,16 +345,10 @@ def analyze(
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON object and nothing else; no pictures.")
     ] = False,
-    gimbal_angles: Annotated[
-        str | None,
-        typer.Option(help="'30 deg, -30 deg, ...' (or rad), instead of the scenario's."),
-    ] = None,
+    gimbal_angles: AnglesOption = None,
 ) -> None:
     """Modes, isolator channels, gain range and margins: per axis and of the whole satellite."""
-    checked = _load(scenario, None, None)
-    if gimbal_angles is not None:
-        angles = [angle.strip() for angle in gimbal_angles.split(",")]
-        checked = checked.with_overrides({"cluster.gimbal_angles": angles})
+    checked = _at_angles(_load(scenario, None, None), gimbal_angles)
     if not as_json:
         _make_folder(output)
     _import_heavy()
@@ -367,13 +379,98 @@ def _print_analysis(study: Study, output: Path) -> None:
     print(f"wrote analysis.json and {len(figures)} pictures to {output}/")
 
 
-def _load(name: str, mount: Mount | None, duration: str | None) -> Scenario:
+@app.command()
+def jitter(
+    scenario: ScenarioArgument,
+    output: FolderOption = Path("out"),
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON object and nothing else; no pictures.")
+    ] = False,
+    gimbal_angles: AnglesOption = None,
+) -> None:
+    """Jitter at each rotor order with the isolator and without, its budget and worst angles."""
+    checked = _at_angles(_load(scenario, None, None), gimbal_angles)
+    if not as_json:
+        _make_folder(output)
+    _import_heavy()
+    from quietbus import api
+
+    try:
+        with _status() as tell:
+            tell("computing (compiles for some seconds the first time)")
+            study = api.jitter(checked)
+            numbers = study.to_dict()
+    except ValueError as error:
+        raise _BadInput(f"{scenario}: {error}") from None
+    if as_json:
+        print(json.dumps(numbers, indent=2, allow_nan=False))
+        return
+    from quietbus.plots import jitter_figures, save_figures
+    from quietbus.tables import jitter_tables
+
+    for table in jitter_tables(numbers):
+        _print(table)
+    with _status() as tell:
+        tell("drawing")
+        figures = jitter_figures(study)
+        save_figures(figures, output)
+    (output / "jitter.json").write_text(json.dumps(numbers, indent=2) + "\n")
+    print(f"wrote jitter.json and {len(figures)} pictures to {output}/")
+
+
+@app.command()
+def reproduce(
+    paper: Annotated[str, typer.Argument(metavar="PAPER", help="Name of a paper: zhang2012.")],
+    output: FolderOption = Path("reproduction"),
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="Make everything again, also what is made already.")
+    ] = False,
+) -> None:
+    """Make every figure and number of a paper again; what is made is kept for the next start."""
+    from quietbus.reproduce import PAPERS
+
+    if paper not in PAPERS:
+        raise _BadInput(f"unknown paper '{paper}'; known: {', '.join(PAPERS)}")
+    _make_folder(output)
+    _import_heavy()
+    from quietbus.reproduce import load_paper
+    from quietbus.reproduce.pages import verdicts_table
+    from quietbus.reproduce.paper import reproduce as make
+
+    with _keeping_results(), _fraction() as tell, _notes():
+        try:
+            outcome = make(load_paper(paper), output, tell, fresh)
+        except OSError as error:
+            raise _BadInput(f"{output}: cannot be written: {error.strerror or error}") from None
+    _print(verdicts_table(outcome.table))
+    print(
+        f"{len(outcome.made)} figures made, {len(outcome.kept)} kept from before; wrote report.md, "
+        f"table.md and table.json to {output}/"
+    )
+    if outcome.interrupted:
+        _fail("interrupted; start again to continue here")
+    if outcome.failed:
+        reasons = "; ".join(f"{name}: {reason}" for name, reason in outcome.failed.items())
+        _fail(f"{len(outcome.failed)} figures failed: {reasons}")
+
+
+def _at_angles(scenario: Scenario, gimbal_angles: str | None) -> Scenario:
+    if gimbal_angles is None:
+        return scenario
+    angles = [angle.strip() for angle in gimbal_angles.split(",")]
+    return scenario.with_overrides({"cluster.gimbal_angles": angles})
+
+
+def _load(
+    name: str, mount: Mount | None, duration: str | None, output_rate: str | None = None
+) -> Scenario:
     """The scenario with the command line's values instead of its own."""
     from quietbus.scenario import load_scenario
 
     overrides = {
         "isolator.mount": mount and mount.value,
         "simulation.duration": duration,
+        "simulation.output_rate": output_rate,
     }
     return load_scenario(name).with_overrides(
         {key: value for key, value in overrides.items() if value is not None}
@@ -420,6 +517,24 @@ def _progress(runs: Mapping[str, float]) -> Iterator[Callable[[str, float], None
 
         def tell(run: str, t: float) -> None:
             bars.update(tasks[run], completed=t, description=run)
+            if _Stop.asked:
+                raise KeyboardInterrupt
+
+        yield tell
+
+
+@contextmanager
+def _fraction() -> Iterator[Callable[[str, float], None]]:
+    """A bar on standard error for one thing after the other, each from 0 to 1."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description:>40}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True)) as bars:
+        task = bars.add_task("", total=1.0)
+
+        def tell(what: str, fraction: float) -> None:
+            bars.update(task, completed=fraction, description=what)
             if _Stop.asked:
                 raise KeyboardInterrupt
 

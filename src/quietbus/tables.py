@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
@@ -217,3 +217,86 @@ def _transmissibility(study: Study) -> Table:
         rate = (f"{100 * value:.3g} %" for value in passed.rate_ratio[:, i])
         table.add_row(f"bus rate by a {cause}, isolated over rigid", *rate)
     return table
+
+
+def jitter_tables(numbers: Mapping[str, Any]) -> Iterator[Table]:
+    """What ``quietbus jitter`` says, from ``JitterStudy.to_dict``."""
+    angles = ", ".join(f"{angle:.4g}" for angle in numbers["gimbal_angle_deg"])
+    lines = _titled(f"Bus rate at each rotor order, gimbals at {angles} deg, in deg/s")
+    for column in ("rotor", "order", "frequency", "axis", "isolated", "rigid", "left", "dB"):
+        lines.add_column(column, justify="left" if column == "axis" else "right")
+    shaken = [
+        line
+        for line in numbers["orders"]
+        if max(line["rigid"]["bus_rate_amplitude_deg_s"]) > NOISE
+        or max(line["isolated"]["bus_rate_amplitude_deg_s"]) > NOISE
+    ]
+    for line in shaken:
+        for i, axis in enumerate(AXES):
+            lines.add_row(
+                *(
+                    (str(line["cmg"]), str(line["order"]), f"{line['frequency_hz']:.5g} Hz")
+                    if i == 0
+                    else ("", "", "")
+                ),
+                axis,
+                *(f"{line[m]['bus_rate_amplitude_deg_s'][i]:.3e}" for m in ("isolated", "rigid")),
+                *_left(line, i),
+            )
+    if not shaken:
+        lines.caption = f"no rotor shakes the bus by more than {NOISE:g} deg/s"
+    elif len(shaken) < len(numbers["orders"]):
+        lines.caption = f"orders below {NOISE:g} deg/s left out"
+    yield lines
+
+    combined = numbers["combined"]
+    together = _titled("All rotors and orders together")
+    for column in ("", "axis", "unit", "isolated", "rigid", "left", "dB"):
+        together.add_column(column, justify="right" if column not in ("", "axis") else "left")
+    for title, key in (
+        ("envelope, phases as given", "envelope"),
+        ("worst case, any phases", "worst_case"),
+        ("root sum of squares", "rss"),
+        ("RMS, phases as given", "rms"),
+    ):
+        for name, unit in (("bus_rate", "deg_s"), ("bus_attitude", "arcsec")):
+            for i, axis in enumerate(AXES):
+                values = [combined[m][f"{name}_{key}_{unit}"][i] for m in ("isolated", "rigid")]
+                both = _left(combined, i) if (key, name) == ("envelope", "bus_rate") else ("", "")
+                together.add_row(
+                    title if (name, i) == ("bus_rate", 0) else "",
+                    axis,
+                    unit.replace("deg_s", "deg/s"),
+                    *(f"{value:.3e}" for value in values),
+                    *both,
+                )
+    yield together
+
+    own = numbers["mount"]
+    parts = _titled(f"Budget, {own}: bus rate by rotor and kind of imbalance, in deg/s")
+    for column in ("rotor", "kind", "order", *AXES):
+        parts.add_column(column, justify="left" if column == "kind" else "right")
+    for part in numbers["budget"][own]:
+        if max(part["bus_rate_amplitude_deg_s"]) > NOISE:
+            values = (f"{value:.3e}" for value in part["bus_rate_amplitude_deg_s"])
+            parts.add_row(str(part["cmg"]), part["kind"], str(part["order"]), *values)
+    parts.caption = f"parts below {NOISE:g} deg/s left out"
+    yield parts
+
+    worst = _titled("Worst gimbal angles: norm over axes of the sum of all amplitudes, in deg/s")
+    for column in ("mount", "here", "worst", "at gimbal angles, deg"):
+        worst.add_column(column, justify="right")
+    for mount, found in numbers["worst"].items():
+        worst.add_row(
+            mount,
+            f"{found['bus_rate_norm_here_deg_s']:.3e}",
+            f"{found['bus_rate_norm_deg_s']:.3e}",
+            ", ".join(f"{angle:.1f}" for angle in found["gimbal_angle_deg"]),
+        )
+    yield worst
+
+
+def _left(numbers: Mapping[str, Any], axis: int) -> tuple[str, str]:
+    """What the isolator leaves, in percent and dB."""
+    percent, db = numbers["ratio_percent"][axis], numbers["ratio_db"][axis]
+    return ("" if percent is None else f"{percent:.3g} %", "" if db is None else f"{db:.1f}")

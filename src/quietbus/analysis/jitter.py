@@ -89,7 +89,7 @@ def steady_jitter(
     moments = ClusterMoments.expand(satellite.cluster)
     slow = slow_motion(satellite, jnp.zeros(()), state, moments.averaged())
     small = vibration(satellite, slow, moments, leg_coefficients(satellite, slow))
-    xi = rotor_response(small, moments, tuple(range(len(gimbal_angle))))
+    xi = rotor_response(small, moments)
     s = 1j * moments.rotor_speed[:, None] * jnp.array(ORDERS)
     outputs = jax.vmap(jax.vmap(lambda s, x: linear_outputs(satellite, small, s, x, NOTHING_SEEN)))
     return outputs(s, xi), small

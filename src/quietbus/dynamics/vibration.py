@@ -290,36 +290,27 @@ def rotor_forces(slow: SlowMotion, moments: ClusterMoments) -> Complex[Array, "o
 
 
 def rotor_response(
-    small: Vibration, moments: ClusterMoments, equal_speed: tuple[int, ...]
+    small: Vibration, moments: ClusterMoments, one_speed: bool = False
 ) -> Complex[Array, "cmg order 12"]:
     """xi of the steady response to each order of each rotor, Re(xi exp(i h phi)).
 
     Args:
         moments: ``ClusterMoments.expand(satellite.cluster)``.
-        equal_speed: (cmg,) for each rotor the number of one that turns at the same speed, itself
-            or one before it; see ``equal_speeds``.
+        one_speed: all rotors turn at one speed, so that one elimination serves them all.
     """
-    forces = rotor_forces(small.slow, moments)
-    responses: dict[tuple[int, int], Array] = {}
-    for first in set(equal_speed):
-        for order, h in enumerate(ORDERS):
-            s = 1j * h * moments.rotor_speed[first]
-            # a rotor that stands still shakes nothing
-            standing = s == 0.0
-            xi = small.respond(jnp.where(standing, 1j, s), forces[order].T)
-            responses[first, order] = jnp.where(standing, 0.0, xi)
-    return jnp.stack(
-        [
-            jnp.stack([responses[first, order][:, j] for order in range(len(ORDERS))])
-            for j, first in enumerate(equal_speed)
-        ]
-    )
 
+    def respond(h, speed, force):
+        s = 1j * h * speed
+        standing = s == 0.0  # a rotor that stands still shakes nothing
+        return jnp.where(standing, 0.0, small.respond(jnp.where(standing, 1j, s), force))
 
-def equal_speeds(satellite: Satellite) -> tuple[int, ...]:
-    """(cmg,) for each rotor the number of the first one that turns at exactly the same speed."""
-    speeds = np.asarray(satellite.cluster.rotor_speed).tolist()
-    return tuple(speeds.index(speed) for speed in speeds)
+    forces, h = rotor_forces(small.slow, moments), jnp.array(ORDERS)
+    if one_speed:
+        columns = jnp.swapaxes(forces, 1, 2)
+        xi = jax.vmap(respond, (0, None, 0))(h, moments.rotor_speed[0], columns)
+        return jnp.moveaxis(xi, 2, 0)
+    each = jax.vmap(jax.vmap(respond, (None, 0, 0)), (0, None, 0))
+    return jnp.swapaxes(each(h, moments.rotor_speed, forces[..., None])[..., 0], 0, 1)
 
 
 class View(eqx.Module):

@@ -24,7 +24,6 @@ from quietbus.dynamics.vibration import (
     NOTHING_SEEN,
     Vibration,
     View,
-    equal_speeds,
     leg_coefficients,
     linear_outputs,
     rotor_response,
@@ -248,8 +247,8 @@ class _Along:
 
     def __init__(self, satellite: Satellite, time: np.ndarray, states: State):
         self.satellite, self.time, self.states = satellite, time, states
-        self.equal_speed = equal_speeds(satellite)
         speeds = np.abs(np.asarray(satellite.cluster.rotor_speed))
+        self.one_speed = len(np.unique(np.asarray(satellite.cluster.rotor_speed))) == 1
         self.slowest = float(np.min(speeds[speeds > 0.0], initial=np.inf))
         self.known: dict[int, np.ndarray] = {}
         self.inertia = np.ones(12)
@@ -260,7 +259,7 @@ class _Along:
         t, states = self._at(instants, INSTANTS if len(self.time) > 1 else 1)
         legs = self._legs(instants)
         legs = np.concatenate([legs, np.repeat(legs[-1:], len(t) - len(legs), axis=0)])
-        result = _compiled_chunk(self.satellite, t, states, legs, view, self.equal_speed)
+        result = _compiled_chunk(self.satellite, t, states, legs, view, self.one_speed)
         return jax.tree.map(lambda leaf: np.asarray(leaf)[: len(instants)], result)
 
     def _at(self, instants, size):
@@ -332,7 +331,7 @@ def _compiled_legs(satellite, t, states):
 
 
 @eqx.filter_jit
-def _compiled_chunk(satellite, t, states, legs, view, equal_speed):
+def _compiled_chunk(satellite, t, states, legs, view, one_speed):
     moments = ClusterMoments.expand(satellite.cluster)
     averaged = moments.averaged()
     s = 1j * moments.rotor_speed[:, None] * jnp.array(ORDERS)
@@ -342,7 +341,7 @@ def _compiled_chunk(satellite, t, states, legs, view, equal_speed):
         example = jax.eval_shape(lambda: leg_coefficients(satellite, slow))
         _, unravel = ravel_pytree(jax.tree.map(lambda leaf: jnp.zeros(leaf.shape), example))
         small = vibration(satellite, slow, moments, unravel(row))
-        xi = rotor_response(small, moments, equal_speed)
+        xi = rotor_response(small, moments, one_speed)
         views = jax.vmap(jax.vmap(lambda s, x: linear_outputs(satellite, small, s, x, view)))
         return views(s, xi), xi, small
 

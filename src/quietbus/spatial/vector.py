@@ -54,6 +54,7 @@ def _solve_jvp(primals, tangents):
 
 
 @jax.custom_jvp
+@jax.jit  # traced once for many uses
 def solve_small(A: Inexact[Array, "n n"], B: Inexact[Array, "n m"]) -> Inexact[Array, "n m"]:
     """Solve ``A X = B`` for a small A by elimination with partial pivoting.
 
