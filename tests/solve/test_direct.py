@@ -8,7 +8,7 @@ import pytest
 import quietbus as qb
 from quietbus.build import build_initial_state, build_satellite
 from quietbus.scenario import load_scenario
-from quietbus.solve.direct import PIECE, Tolerances, integrate
+from quietbus.solve.direct import Scheme, Tolerances, integrate
 
 QUIET = {"control": "none", "initial.attitude": [0, 0, 0]}
 
@@ -109,10 +109,10 @@ def test_stiff_run_can_be_watched_and_stopped_within_a_piece():
 
 def test_pieces_join_without_a_seam():
     """A free bus without rotor motion turns evenly over the joints of the pieces."""
-    run = fly(QUIET | {"initial.rate": [0.01, 0, 0], "control": "none"}, duration=2.5 * PIECE)
+    run = fly(QUIET | {"initial.rate": [0.01, 0, 0], "control": "none"}, duration=2.5 * Scheme().piece)
     position = run.outputs.platform_position - run.outputs.bus_position
     jumps = np.abs(np.diff(position, n=2, axis=0))
-    joints = np.isclose(run.time[1:-1] % PIECE, 0.0)
+    joints = np.isclose(run.time[1:-1] % Scheme().piece, 0.0)
     assert np.max(jumps[joints]) <= 1.5 * np.max(jumps[~joints])
 
 

@@ -1,27 +1,30 @@
 """Pictures of the same scenario without the platform and with it."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from quietbus.plots.jitter import draw_lines_by_order, log_scale
 from quietbus.plots.run import TIME, finish_spectrum, gimbals, struts
 from quietbus.plots.signals import (
     ANGLES,
     AXES,
+    LINES,
+    NOISE,
     Jitter,
     cut_short,
     degrees,
     euler_angles,
+    is_harmonic,
     jitter,
+    last_lines,
     rate_spectrum,
 )
 from quietbus.plots.style import (
     COLOURS,
-    DASHES,
     draw_line,
     explain,
     new_figure,
@@ -31,26 +34,23 @@ from quietbus.plots.style import (
 )
 from quietbus.results import scenario_of, summarize
 
-# mount: (what it is called, its line)
-LINES: dict[str, tuple[str, dict[str, Any]]] = {
-    "rigid": ("without platform (rigid mount)", {"color": COLOURS[1], "linestyle": "-"}),
-    "isolated": ("with platform", {"color": COLOURS[0], "linestyle": DASHES[1]}),
-}
-
 
 def compare_figures(runs: Mapping[str, xr.Dataset]) -> dict[str, Figure]:
     """All pictures of a comparison by name.
 
     Args:
-        runs: "rigid" and "isolated", as ``quietbus.compare`` gives them.
+        runs: "rigid" and "isolated", as ``quietbus.compare`` gives them, of one method.
     """
     if runs.keys() != LINES.keys():
         raise ValueError(f"expected the runs rigid and isolated, got {', '.join(runs) or 'none'}")
+    harmonic = is_harmonic(runs["isolated"])
+    if harmonic != is_harmonic(runs["rigid"]):
+        raise ValueError("expected runs of one method, got a harmonic one and a direct one")
     with style():
         return {
-            "rates": rates(runs),
+            "rates": envelope_comparison(runs) if harmonic else rates(runs),
             "residual": residual(runs),
-            "spectrum": spectrum(runs),
+            "spectrum": last_spectra(runs) if harmonic else spectrum(runs),
             "attitude": attitude(runs),
             "gimbals": gimbals(runs["isolated"]),
             "struts": struts(runs["isolated"]),
@@ -110,6 +110,69 @@ def rates(runs: Mapping[str, xr.Dataset]) -> Figure:
         if mount in found:
             axes.set_xlabel(f"time after {found[mount].start:.4g} s [ms]")
     return figure
+
+
+@style()
+def envelope_comparison(runs: Mapping[str, xr.Dataset]) -> Figure:
+    """Jitter over a manoeuvre without and with the platform, and what the platform leaves of it.
+
+    Args:
+        runs: harmonic ones, "rigid" and "isolated".
+    """
+    envelopes = {mount: degrees(runs[mount], "bus_rate_jitter_envelope") for mount in LINES}
+    time, passed = _passed(runs, envelopes)
+    figure = new_figure(6.2, _titled(runs, _what_is_left(passed)))
+    panels = figure.subplots(3, 3, sharex=True, sharey="row", height_ratios=(1.2, 2.0, 1.2))
+    largest = max(float(values.max()) for values in envelopes.values())
+    factor, unit = scaled(largest, "deg/s")
+    for i, (slow, jitter, ratio) in enumerate(panels.T):
+        for mount in LINES:
+            _line(slow, runs[mount], degrees(runs[mount], "bus_rate")[:, i], mount)
+            if envelopes[mount][:, i].max() > NOISE:
+                _line(jitter, runs[mount], factor * envelopes[mount][:, i], mount)
+        ratio.set(xlabel=TIME, ylim=(0.0, None))
+        slow.set_title(f"about {AXES[i]}")
+        if not jitter.lines:
+            jitter.text(0.5, 0.5, "no jitter", transform=jitter.transAxes, ha="center")
+        if np.isfinite(passed[:, i]).any():
+            draw_line(ratio, time, 100.0 * passed[:, i], color="black")
+            least, most = 100.0 * np.nanmin(passed[:, i]), 100.0 * np.nanmax(passed[:, i])
+            ratio.set_title(f"{least:.3g} to {most:.3g} %")
+    if largest > NOISE:
+        every = np.concatenate([values[values > 1e-6 * largest] for values in envelopes.values()])
+        log_scale(panels[1, 0], 0.5 * factor * float(every.min()), 2.0 * factor * largest)
+    highest = 100.0 * float(np.nanmax(passed, initial=0.0))
+    panels[2, 0].set_ylim(0.0, 1.15 * highest or 1.0)
+    labels = ("slow motion [deg/s]", f"jitter's envelope [{unit}]", "with / without [%]")
+    for axes, label in zip(panels[:, 0], labels, strict=True):
+        axes.set_ylabel(label)
+    figure.align_ylabels(panels[:, 0])
+    share_legend(figure, panels[0, 0])
+    return figure
+
+
+def _passed(
+    runs: Mapping[str, xr.Dataset], envelopes: Mapping[str, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Times (n,) [s] of both runs, and the share (n, axis) of the jitter that is left; NaN of none.
+
+    The envelope without the platform is interpolated where the runs have other instants.
+    """
+    times = {mount: runs[mount]["time"].to_numpy() for mount in LINES}
+    both = times["isolated"] <= times["rigid"][-1]
+    time = times["isolated"][both]
+    without = np.column_stack(
+        [np.interp(time, times["rigid"], envelopes["rigid"][:, i]) for i in range(3)]
+    )
+    passed = envelopes["isolated"][both] / np.where(without > NOISE, without, np.nan)
+    return time, passed
+
+
+def _what_is_left(passed: np.ndarray) -> str:
+    """What the platform does over the whole manoeuvre, for a title."""
+    if not np.isfinite(passed).any():
+        return "Angular rate of the bus"
+    return f"The platform leaves at most {100.0 * np.nanmax(passed):.2g} % of the jitter"
 
 
 def residual(runs: Mapping[str, xr.Dataset]) -> Figure:
@@ -184,6 +247,14 @@ def spectrum(runs: Mapping[str, xr.Dataset]) -> Figure:
     panels[-1].set_xlabel("frequency [Hz]")
     finish_spectrum(panels, runs["rigid"])
     share_legend(figure, panels[0])
+    return figure
+
+
+def last_spectra(runs: Mapping[str, xr.Dataset]) -> Figure:
+    """Lines of the bus rate at the ends of harmonic runs, by order and rotor."""
+    ends = {f"{runs[mount]['time'].to_numpy()[-1]:.4g} s" for mount in LINES}
+    figure = new_figure(5.6, _titled(runs, f"Lines of the bus rate at {' and '.join(sorted(ends))}"))
+    draw_lines_by_order(figure, {mount: last_lines(runs[mount]) for mount in LINES})
     return figure
 
 

@@ -1,19 +1,24 @@
 """Pictures of one run."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from quietbus.plots.jitter import NO_JITTER, draw_lines_by_order, log_scale
 from quietbus.plots.signals import (
     ANGLES,
     AXES,
+    NOISE,
     degrees,
     euler_angles,
     heading,
+    is_harmonic,
     jitter,
+    last_lines,
     rate_spectrum,
     rotor_frequencies,
 )
@@ -30,8 +35,15 @@ from quietbus.plots.style import (
     style,
 )
 from quietbus.results import aliasing, scenario_of
+from quietbus.solve.harmonic import SLOW_CHANGE
 
 TIME = "time [s]"
+# of a harmonic run's jitter: (what it is called, its line)
+COMBINED: dict[str, tuple[str, dict[str, Any]]] = {
+    "envelope": ("envelope, phases as given", {"linewidth": 1.8}),
+    "worst_case": ("worst case, any phases", {"linewidth": 0.8, "linestyle": DASHES[1]}),
+    "rss": ("root of sum of squares", {"linewidth": 0.8, "linestyle": DASHES[3]}),
+}
 
 
 def run_figures(run: xr.Dataset) -> dict[str, Figure]:
@@ -42,9 +54,9 @@ def run_figures(run: xr.Dataset) -> dict[str, Figure]:
     with style():
         figures = {
             "attitude": attitude(run),
-            "rates": rates(run),
+            "rates": rates_and_envelope(run) if is_harmonic(run) else rates(run),
             "gimbals": gimbals(run),
-            "spectrum": spectrum(run),
+            "spectrum": last_spectrum(run) if is_harmonic(run) else spectrum(run),
             "control": control(run),
         }
         if run.attrs["mount"] != "rigid":
@@ -91,6 +103,64 @@ def rates(run: xr.Dataset) -> Figure:
         else:
             panel.tick_params(labelleft=False)
     return figure
+
+
+def rates_and_envelope(run: xr.Dataset) -> Figure:
+    """Rates of the bus in a harmonic run: slow motion, jitter over time, its estimated error."""
+    figure = new_figure(6.4, heading(run, "Angular rate of the bus"))
+    grid = figure.add_gridspec(3, 3, height_ratios=(2.0, 2.6, 1.3))
+    time = run["time"].to_numpy()
+    whole = figure.add_subplot(grid[0, :])
+    draw_lines(whole, time, degrees(run, "bus_rate"), AXES)
+    whole.set(ylabel="rate [deg/s]", title="slow motion")
+    whole.legend(ncols=3)
+    values = {name: degrees(run, f"bus_rate_jitter_{name}") for name in COMBINED}
+    largest = max(float(each.max()) for each in values.values())
+    if largest < NOISE:
+        explain(figure.add_subplot(grid[1:, :]), NO_JITTER)
+        return figure
+    factor, unit = scaled(largest, "deg/s")
+    positive = np.concatenate([each[each > 1e-6 * largest] for each in values.values()])
+    first = None
+    for i, axis in enumerate(AXES):
+        first = panel = figure.add_subplot(grid[1, i], sharey=first)
+        for name, (label, look) in COMBINED.items():
+            line = {"color": COLOURS[i] if name == "envelope" else "0.25", "label": label} | look
+            draw_line(panel, time, factor * values[name][:, i], **line)
+        log_scale(panel, 0.5 * factor * float(positive.min()), 2.0 * factor * largest)
+        panel.set(xlabel=TIME, title=f"jitter about {axis}")
+        if i == 0:
+            panel.set_ylabel(f"amplitude [{unit}]")
+        else:
+            panel.tick_params(labelleft=False)
+    _change_error(figure.add_subplot(grid[2, :]), run)
+    share_legend(figure, figure.axes[1])
+    return figure
+
+
+def _change_error(axes: Axes, run: xr.Dataset) -> None:
+    """Estimated error of a harmonic run's jitter, and what is too much."""
+    time, error = run["time"].to_numpy(), 100.0 * run["jitter_change_error"].to_numpy()
+    limit, worst = 100.0 * SLOW_CHANGE, int(np.argmax(error))
+    draw_line(axes, time, error, color="black")
+    axes.axhline(limit, color=COLOURS[1], linewidth=0.9)
+    axes.annotate(
+        "above: use method direct",
+        (1.0, limit),
+        (0, -2),
+        xycoords=("axes fraction", "data"),
+        textcoords="offset points",
+        ha="right",
+        va="top",
+        fontsize=8,
+        color=COLOURS[1],
+    )
+    log_scale(axes, 1e-6 * limit, 3.0 * max(limit, error[worst]))
+    axes.set(xlabel=TIME, ylabel="error [%]")
+    axes.set_title(
+        "error of the jitter by the motion's change, estimated: "
+        f"at most {error[worst]:.2g} %, at {time[worst]:.4g} s"
+    )
 
 
 def gimbals(run: xr.Dataset) -> Figure:
@@ -143,6 +213,14 @@ def spectrum(run: xr.Dataset) -> Figure:
     axes.set(xlabel="frequency [Hz]", ylabel="amplitude [deg/s]", title=f"last {span:.3g} s")
     finish_spectrum([axes], run)
     share_legend(figure, axes)
+    return figure
+
+
+def last_spectrum(run: xr.Dataset) -> Figure:
+    """Lines of the bus rate at the end of a harmonic run, by order and rotor."""
+    end = run["time"].to_numpy()[-1]
+    figure = new_figure(5.4, heading(run, f"Lines of the bus rate at {end:.4g} s"))
+    draw_lines_by_order(figure, {run.attrs["mount"]: last_lines(run)})
     return figure
 
 

@@ -1,14 +1,18 @@
 """What the pictures show of a run, in the units of the pictures."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
+from quietbus.analysis.jitter import SAME_FREQUENCY, combine
 from quietbus.analysis.residual import residual
 from quietbus.analysis.spectrum import Spectrum, amplitude_spectrum, detrended
+from quietbus.plots.style import COLOURS, DASHES
 from quietbus.results import aliasing, scenario_of
 
 AXES = ("x", "y", "z")
@@ -16,6 +20,17 @@ ANGLES = ("roll", "pitch", "yaw")
 TREND = 1.0  # [s] of the end of a run over which the slow motion is fitted, as in its summary
 BLURRED = 6  # bins, half the main lobe of the spectrum's window
 SPECTRUM = 10.0  # [s] at most, of the end of a run
+NOISE = 1e-10  # [deg/s] jitter smaller than this is none
+# mount: (what it is called, its line)
+LINES: dict[str, tuple[str, dict[str, Any]]] = {
+    "rigid": ("without platform (rigid mount)", {"color": COLOURS[1], "linestyle": "-"}),
+    "isolated": ("with platform", {"color": COLOURS[0], "linestyle": DASHES[1]}),
+}
+
+
+def is_harmonic(run: xr.Dataset) -> bool:
+    """Whether a run holds slow motion and jitter apart, instead of every rotor turn."""
+    return run.attrs.get("method") == "harmonic"
 
 
 def heading(run: xr.Dataset, what: str) -> str:
@@ -103,3 +118,59 @@ def rate_spectrum(run: xr.Dataset) -> tuple[Spectrum, float]:
     last = time >= time[-1] - span
     lines = amplitude_spectrum(time[last], degrees(run, "bus_rate")[last])
     return Spectrum(lines.frequency[BLURRED:], lines.amplitude[BLURRED:]), span
+
+
+@dataclass(frozen=True)
+class RotorLines:
+    """Lines of the bus rate at the orders of the rotors."""
+
+    amplitude: np.ndarray  # (cmg, order, axis) [deg/s] complex, as ``combine`` takes it
+    frequency: np.ndarray  # (cmg, order) [rad/s], of either sign
+    phase: np.ndarray  # (cmg, order) [rad] at t = 0
+    orders: tuple[int, ...]
+
+    def by_frequency(self) -> list[list[tuple[int, int]]]:
+        """Lines (cmg, order) of each frequency, from the lowest to the highest."""
+        size = np.abs(self.frequency)
+        groups: list[list[tuple[int, int]]] = []
+        for flat in np.argsort(size, axis=None, kind="stable"):
+            line = divmod(int(flat), size.shape[1])
+            first = size[groups[-1][0]] if groups else -1.0
+            if size[line] - first <= SAME_FREQUENCY * abs(first):
+                groups[-1].append(line)
+            else:
+                groups.append([line])
+        return [sorted(group) for group in groups]
+
+    def together(self, group: Sequence[tuple[int, int]]) -> np.ndarray:
+        """Amplitude (axis,) [deg/s] of lines of one frequency, added with their phases."""
+        j, k = np.array(group).T
+        only = np.zeros_like(self.amplitude)
+        only[j, k] = self.amplitude[j, k]
+        return combine(only, self.frequency, self.phase).envelope
+
+    def name(self, group: Sequence[tuple[int, int]]) -> str:
+        """``1Ω, 100 Hz`` for lines of one frequency."""
+        orders = sorted({self.orders[k] for _, k in group})
+        hz = abs(self.frequency[group[0]]) / (2.0 * np.pi)
+        return f"{', '.join(f'{order}Ω' for order in orders)}, {hz:.5g} Hz"
+
+
+def last_lines(run: xr.Dataset) -> RotorLines:
+    """Lines at the end of a harmonic run."""
+    last = run.isel(time=-1)
+    amplitude, shift = (
+        last[f"bus_rate_jitter_{part}"].transpose("cmg", "order", "axis").to_numpy()
+        for part in ("amplitude", "phase")
+    )
+    scenario = scenario_of(run)
+    units = scenario.cluster.placed()
+    orders = last["order"].to_numpy()
+    speed = np.array([unit.rotor.speed if unit.rotor else 0.0 for unit in units])
+    phase = np.array(scenario.cluster.rotor_phases or np.zeros(len(units)))
+    return RotorLines(
+        np.rad2deg(amplitude) * np.exp(1j * shift),
+        np.outer(speed, orders),
+        np.outer(phase, orders),
+        tuple(orders.tolist()),
+    )

@@ -1,0 +1,222 @@
+"""Make a paper's figures and numbers again, each once: what is made is kept and not made twice."""
+
+import hashlib
+import importlib.metadata
+import json
+import os
+import pathlib
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from matplotlib.figure import Figure
+
+import quietbus
+from quietbus.plots.style import style
+from quietbus.reproduce.claims import Claim
+from quietbus.reproduce.pages import report_page, table_page
+
+Tell = Callable[[str, float], None]  # what is being done, and how far it is, 0 to 1
+NOT_COMPUTED_WITH = ("cli.py", "tables.py", "report")  # sources that no number depends on
+LIBRARIES = ("jax", "diffrax", "equinox", "numpy", "scipy", "matplotlib", "control", "mujoco")
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What one part found: a picture and its caption, numbers, and words."""
+
+    figure: Figure
+    caption: str
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    text: str = ""  # Markdown, before the picture
+
+
+@dataclass(frozen=True)
+class Part:
+    """One figure with the numbers that come with it."""
+
+    name: str  # of its file
+    title: str
+    make: Callable[[Any], Findings]  # from the paper's bench
+
+
+@dataclass(frozen=True)
+class Paper:
+    """A paper: its published numbers, and the parts that make them again."""
+
+    name: str
+    reference: str
+    claims: Sequence[Claim]
+    chapters: Mapping[str, Sequence[Part]]  # by heading
+    bench: Callable[["Workshop"], Any]  # what the parts share, computed when first asked for
+
+    @property
+    def parts(self) -> list[Part]:
+        """All parts in order."""
+        return [part for parts in self.chapters.values() for part in parts]
+
+
+@dataclass
+class Made:
+    """One part as it is kept in the folder."""
+
+    key: str
+    file: str
+    picture: str  # hash of the file
+    caption: str
+    text: str
+    numbers: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a reproduction went."""
+
+    table: dict[str, Any]
+    made: tuple[str, ...]  # parts made now
+    kept: tuple[str, ...]  # parts found made
+    failed: Mapping[str, str]  # part: reason
+    interrupted: bool
+
+
+class Workshop:
+    """The output folder, the hash that what is kept must carry, and how to tell progress."""
+
+    def __init__(self, folder: pathlib.Path, tell: Tell):
+        self.folder, self.tell = folder, tell
+        self.key = fingerprint()
+        self.store = folder / ".made"
+        self.store.mkdir(parents=True, exist_ok=True)
+        for left in self.store.glob("*.part"):
+            left.unlink()
+
+    def kept(self, part: Part) -> Made | None:
+        """What is kept of a part, if it is whole and of the same inputs and sources."""
+        try:
+            made = Made(**json.loads((self.store / f"{part.name}.json").read_text("utf-8")))
+            whole = _hash((self.folder / made.file).read_bytes()) == made.picture
+        except (OSError, ValueError, TypeError):
+            return None
+        return made if whole and made.key == self.key else None
+
+    def keep(self, part: Part, found: Findings) -> Made:
+        """Write a part's picture and numbers, each whole or not at all."""
+        file = f"{part.name}.png"
+        unfinished = self.store / f"{file}.part"
+        with style():
+            found.figure.savefig(unfinished, format="png")
+        picture = unfinished.read_bytes()
+        unfinished.replace(self.folder / file)
+        numbers = {name: float(value) for name, value in found.numbers.items()}
+        made = Made(self.key, file, _hash(picture), found.caption, found.text, numbers)
+        self.write(self.store / f"{part.name}.json", json.dumps(asdict(made), indent=1))
+        return made
+
+    def write(self, path: pathlib.Path, text: str) -> None:
+        """Write a text whole or not at all."""
+        unfinished = self.store / f"{path.name}.part"
+        unfinished.write_text(text, "utf-8")
+        os.replace(unfinished, path)
+
+
+def reproduce(
+    paper: Paper, folder: str | os.PathLike[str], tell: Tell | None = None, fresh: bool = False
+) -> Outcome:
+    """Make all figures, ``table.json``, ``table.md`` and ``report.md`` of a paper.
+
+    A part that fails is named in the table and leaves the others alone. After Ctrl-C (a
+    KeyboardInterrupt, also one that ``tell`` raises) what was made is kept.
+
+    Args:
+        paper: what to reproduce.
+        folder: for the results; made if it is not there.
+        tell: called with what is being done and how far it is (0 to 1).
+        fresh: make everything again.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    tell = tell or (lambda _what, _fraction: None)
+    shop = Workshop(pathlib.Path(folder), tell)
+    bench = paper.bench(shop)
+    if fresh:
+        for path in shop.store.iterdir():
+            path.unlink()
+    done: dict[str, Made] = {}
+    new: list[str] = []
+    failed: dict[str, str] = {}
+    interrupted = False
+    try:
+        for part in paper.parts:
+            tell(part.title, 0.0)
+            kept = shop.kept(part)
+            if kept is not None:
+                done[part.name] = kept
+                continue
+            try:
+                with style():
+                    found = part.make(bench)
+                done[part.name] = shop.keep(part, found)
+                new.append(part.name)
+            except Exception as error:  # any failure of one part must leave the others alone
+                failed[part.name] = f"{type(error).__name__}: {error}"
+                shop.write(shop.store / f"{part.name}.log", traceback.format_exc())
+    except KeyboardInterrupt:
+        interrupted = True
+    table = _table(paper, done, failed, shop.key)
+    shop.write(shop.folder / "table.json", json.dumps(table, indent=2, allow_nan=False) + "\n")
+    shop.write(shop.folder / "table.md", table_page(table))
+    chapters = {
+        heading: [(part.title, done.get(part.name), part.name) for part in parts]
+        for heading, parts in paper.chapters.items()
+    }
+    shop.write(shop.folder / "report.md", report_page(table, chapters))
+    kept_names = tuple(name for name in done if name not in new)
+    return Outcome(table, tuple(new), kept_names, failed, interrupted)
+
+
+def _table(
+    paper: Paper, done: Mapping[str, Made], failed: Mapping[str, str], key: str
+) -> dict[str, Any]:
+    findings = {name: value for made in done.values() for name, value in made.numbers.items()}
+    return {
+        "paper": paper.name,
+        "reference": paper.reference,
+        "quietbus_version": quietbus.__version__,
+        "fingerprint": key,
+        "rows": [claim.row(findings) for claim in paper.claims],
+        "figures": [
+            {
+                "name": part.name,
+                "title": part.title,
+                "chapter": heading,
+                "file": done[part.name].file if part.name in done else None,
+                "caption": done[part.name].caption if part.name in done else None,
+            }
+            for heading, parts in paper.chapters.items()
+            for part in parts
+        ],
+        "findings": findings,
+        "failed": [{"name": name, "reason": reason} for name, reason in failed.items()],
+    }
+
+
+def fingerprint() -> str:
+    """Hash of version, sources and scenarios of quietbus and of the libraries' versions."""
+    root = pathlib.Path(quietbus.__file__).parent
+    digest = hashlib.sha256(quietbus.__version__.encode())
+    for path in sorted(root.rglob("*")):
+        part = path.relative_to(root)
+        if path.suffix in (".py", ".yaml") and part.parts[0] not in NOT_COMPUTED_WITH:
+            digest.update(str(part).encode() + path.read_bytes())
+    for library in LIBRARIES:
+        try:
+            digest.update(f"{library} {importlib.metadata.version(library)}".encode())
+        except importlib.metadata.PackageNotFoundError:
+            digest.update(f"no {library}".encode())
+    return digest.hexdigest()
+
+
+def _hash(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()

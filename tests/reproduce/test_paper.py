@@ -1,0 +1,162 @@
+"""Making, keeping, failing and going on, with a small paper of its own."""
+
+import json
+import subprocess
+import sys
+from importlib.resources import files
+
+import jsonschema
+import pytest
+from matplotlib.figure import Figure
+
+from quietbus import cli
+from quietbus.reproduce import paper as machinery
+from quietbus.reproduce.claims import Claim
+from quietbus.reproduce.paper import Findings, Paper, Part, reproduce
+
+SCHEMA = json.loads(files("quietbus.reproduce").joinpath("table.schema.json").read_text())
+
+
+class Small:
+    """A paper of three figures that counts how often each is made."""
+
+    def __init__(self):
+        self.calls = []
+        self.trouble = {}
+        self.paper = Paper(
+            "small",
+            "Nobody, nowhere",
+            [
+                Claim(name, "eq. 1", "a number", "1.0", "m", "because")
+                for name in ("one", "two", "three")
+            ],
+            {
+                "First": (Part("one", "One", self.maker("one")),),
+                "Second": tuple(Part(n, n.title(), self.maker(n)) for n in ("two", "three")),
+            },
+            bench=lambda shop: shop,
+        )
+
+    def maker(self, name):
+        def make(_bench):
+            self.calls.append(name)
+            if name in self.trouble:
+                raise self.trouble[name]
+            return Findings(Figure((1, 1)), f"caption of {name}", {name: 1.0}, f"text of {name}")
+
+        return make
+
+
+@pytest.fixture
+def small():
+    return Small()
+
+
+def read(folder):
+    table = json.loads((folder / "table.json").read_text())
+    jsonschema.validate(table, SCHEMA)
+    return table
+
+
+def test_report_and_table_hold_every_figure_caption_and_number(small, tmp_path):
+    outcome = reproduce(small.paper, tmp_path)
+    assert outcome.made == ("one", "two", "three")
+    table, report = read(tmp_path), (tmp_path / "report.md").read_text()
+    assert [row["verdict"] for row in table["rows"]] == ["within rounding"] * 3
+    for name in small.calls:
+        assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+        for text in (f"caption of {name}", f"text of {name}", f"({name}.png)"):
+            assert text in report
+    assert "| eq. 1 | a number | 1.0 m | 1 m | +0 % | within rounding | because |" in report
+
+
+def test_what_is_made_is_not_made_again_unless_asked(small, tmp_path):
+    reproduce(small.paper, tmp_path)
+    again = reproduce(small.paper, tmp_path)
+    assert (again.made, again.kept) == ((), ("one", "two", "three"))
+    assert len(small.calls) == 3
+    assert len(reproduce(small.paper, tmp_path, fresh=True).made) == 3
+
+
+@pytest.mark.parametrize("harm", ["picture cut", "picture gone", "numbers cut", "numbers of old"])
+def test_what_is_not_whole_or_of_other_sources_is_made_again(small, tmp_path, harm):
+    reproduce(small.paper, tmp_path)
+    picture, numbers = tmp_path / "two.png", tmp_path / ".made" / "two.json"
+    if harm == "picture cut":
+        picture.write_bytes(picture.read_bytes()[:100])
+    elif harm == "picture gone":
+        picture.unlink()
+    elif harm == "numbers cut":
+        numbers.write_text(numbers.read_text()[:40])
+    else:
+        numbers.write_text(numbers.read_text().replace('"key": "', '"key": "old'))
+    (tmp_path / ".made" / "two.png.part").write_text("left behind")
+    assert reproduce(small.paper, tmp_path).made == ("two",)
+    assert not list(tmp_path.rglob("*.part"))
+
+
+def test_the_key_changes_with_sources_and_versions(monkeypatch):
+    before = machinery.fingerprint()
+    assert machinery.fingerprint() == before
+    monkeypatch.setattr(machinery.quietbus, "__version__", "0.0.0")
+    assert machinery.fingerprint() != before
+
+
+def test_a_figure_that_fails_leaves_the_others_and_is_named(small, tmp_path):
+    small.trouble["two"] = ImportError("no engine")
+    outcome = reproduce(small.paper, tmp_path)
+    assert outcome.made == ("one", "three")
+    table = read(tmp_path)
+    assert table["failed"] == [{"name": "two", "reason": "ImportError: no engine"}]
+    assert [row["verdict"] for row in table["rows"]][1] == "not computed"
+    assert "no engine" in (tmp_path / "report.md").read_text()
+    small.trouble.clear()
+    assert reproduce(small.paper, tmp_path).made == ("two",)
+
+
+def test_an_interrupt_keeps_what_is_made_and_the_next_start_goes_on(small, tmp_path):
+    small.trouble["two"] = KeyboardInterrupt()
+    outcome = reproduce(small.paper, tmp_path)
+    assert outcome.interrupted
+    assert outcome.made == ("one",)
+    assert read(tmp_path)["failed"] == []
+    small.trouble.clear()
+    assert reproduce(small.paper, tmp_path).made == ("two", "three")
+
+
+@pytest.mark.parametrize(
+    ("trouble", "said"),
+    [
+        (None, ""),
+        (ValueError("no such number"), "two: ValueError"),
+        (KeyboardInterrupt(), "continue"),
+    ],
+)
+def test_the_command_ends_with_status_1_unless_all_is_made(
+    small, tmp_path, monkeypatch, capsys, trouble, said
+):
+    if trouble:
+        small.trouble["two"] = trouble
+    monkeypatch.setattr("quietbus.reproduce.load_paper", lambda _name: small.paper)
+    monkeypatch.setattr("signal.signal", lambda *_: None)
+    monkeypatch.setattr(sys, "argv", ["quietbus", "reproduce", "zhang2012", "-o", str(tmp_path)])
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    assert (ended.value.code or 0) == (1 if trouble else 0)
+    assert said in capsys.readouterr().err
+    read(tmp_path)
+
+
+def run(*arguments):
+    command = [sys.executable, "-m", "quietbus", "reproduce", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_bad_input_is_told_with_status_2(tmp_path):
+    unknown = run("zhang2013")
+    assert unknown.returncode == 2
+    assert "known: zhang2012" in unknown.stderr
+    (tmp_path / "file").write_text("")
+    blocked = run("zhang2012", "-o", tmp_path / "file")
+    assert blocked.returncode == 2
+    assert "Traceback" not in unknown.stderr + blocked.stderr
