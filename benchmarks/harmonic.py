@@ -50,16 +50,20 @@ print(imported - start, first - imported, again - first)
 """
 
 
-def in_turns(works: Mapping[K, Callable[[], Any]], repeats: int = REPEATS) -> dict[K, float]:
+def in_turns(
+    works: Mapping[K, Callable[[], Any]],
+    repeats: int = REPEATS,
+    clock: Callable[[], float] = time.perf_counter,
+) -> dict[K, float]:
     """Shortest time [s] of each, after a run of each to warm up, all taking turns."""
     best: dict[K, float] = dict.fromkeys(works, np.inf)
     for work in works.values():
         work()
     for _ in range(repeats):
         for name, work in works.items():
-            started = time.perf_counter()
+            started = clock()
             work()
-            best[name] = min(best[name], time.perf_counter() - started)
+            best[name] = min(best[name], clock() - started)
     return best
 
 

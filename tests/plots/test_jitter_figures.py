@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 
 import quietbus as qb
+from quietbus import plots
 from quietbus.jitter_study import jitter_of_designs
 from quietbus.model.cmg import ORDERS
 from quietbus.plots import (
@@ -22,7 +23,6 @@ from quietbus.plots.signals import RotorLines, last_lines
 from quietbus.results import VARIABLES
 from quietbus.scenario import load_scenario
 
-MICRO = 1e6 * np.rad2deg(1.0)  # from rad/s to 1e-6 deg/s
 PASSED = np.array([0.01, 0.02, 0.05])  # what the synthetic platform leaves, per axis
 RNG = np.random.default_rng(7)
 # (cmg, order, axis) [rad/s] of the rigid mount; nothing at the second order
@@ -327,12 +327,10 @@ def test_a_kind_at_a_second_order_has_its_own_hatched_bar():
         scenario=SimpleNamespace(name="made up"),
         budget=same,
         gimbal_angle=np.zeros(2),
-        bus_rate=lambda mount: budget.sum(axis=0),
-        combined=lambda mount: SimpleNamespace(worst_case=np.full(3, 8e-6)),
+        bus_rate=lambda _: budget.sum(axis=0),
+        combined=lambda _: SimpleNamespace(worst_case=np.full(3, 8e-6)),
     )
-    from quietbus.plots.jitter import budget as draw
-
-    axes = draw(study).axes[0]
+    axes = plots.jitter.budget(study).axes[0]
     named = {bars.get_label(): bars for bars in axes.containers}
     assert named.keys() == {"static imbalance, 1Ω", "asymmetry and products, 2Ω"}
     assert named["static imbalance, 1Ω"][0].get_hatch() != (

@@ -109,7 +109,9 @@ def test_stiff_run_can_be_watched_and_stopped_within_a_piece():
 
 def test_pieces_join_without_a_seam():
     """A free bus without rotor motion turns evenly over the joints of the pieces."""
-    run = fly(QUIET | {"initial.rate": [0.01, 0, 0], "control": "none"}, duration=2.5 * Scheme().piece)
+    run = fly(
+        QUIET | {"initial.rate": [0.01, 0, 0], "control": "none"}, duration=2.5 * Scheme().piece
+    )
     position = run.outputs.platform_position - run.outputs.bus_position
     jumps = np.abs(np.diff(position, n=2, axis=0))
     joints = np.isclose(run.time[1:-1] % Scheme().piece, 0.0)

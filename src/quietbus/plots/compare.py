@@ -24,7 +24,6 @@ from quietbus.plots.signals import (
     rate_spectrum,
 )
 from quietbus.plots.style import (
-    COLOURS,
     draw_line,
     explain,
     new_figure,
@@ -125,15 +124,15 @@ def envelope_comparison(runs: Mapping[str, xr.Dataset]) -> Figure:
     panels = figure.subplots(3, 3, sharex=True, sharey="row", height_ratios=(1.2, 2.0, 1.2))
     largest = max(float(values.max()) for values in envelopes.values())
     factor, unit = scaled(largest, "deg/s")
-    for i, (slow, jitter, ratio) in enumerate(panels.T):
+    for i, (slow, size, ratio) in enumerate(panels.T):
         for mount in LINES:
             _line(slow, runs[mount], degrees(runs[mount], "bus_rate")[:, i], mount)
             if envelopes[mount][:, i].max() > NOISE:
-                _line(jitter, runs[mount], factor * envelopes[mount][:, i], mount)
-        ratio.set(xlabel=TIME, ylim=(0.0, None))
+                _line(size, runs[mount], factor * envelopes[mount][:, i], mount)
+        ratio.set_xlabel(TIME)
         slow.set_title(f"about {AXES[i]}")
-        if not jitter.lines:
-            jitter.text(0.5, 0.5, "no jitter", transform=jitter.transAxes, ha="center")
+        if not size.lines:
+            size.text(0.5, 0.5, "no jitter", transform=size.transAxes, ha="center")
         if np.isfinite(passed[:, i]).any():
             draw_line(ratio, time, 100.0 * passed[:, i], color="black")
             least, most = 100.0 * np.nanmin(passed[:, i]), 100.0 * np.nanmax(passed[:, i])
@@ -252,8 +251,7 @@ def spectrum(runs: Mapping[str, xr.Dataset]) -> Figure:
 
 def last_spectra(runs: Mapping[str, xr.Dataset]) -> Figure:
     """Lines of the bus rate at the ends of harmonic runs, by order and rotor."""
-    ends = {f"{runs[mount]['time'].to_numpy()[-1]:.4g} s" for mount in LINES}
-    figure = new_figure(5.6, _titled(runs, f"Lines of the bus rate at {' and '.join(sorted(ends))}"))
+    figure = new_figure(5.6, _titled(runs, "Lines of the bus rate at the end"))
     draw_lines_by_order(figure, {mount: last_lines(runs[mount]) for mount in LINES})
     return figure
 

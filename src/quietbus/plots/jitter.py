@@ -63,8 +63,10 @@ def draw_lines_by_order(figure: Figure, lines: Mapping[str, RotorLines]) -> None
         explain(figure.subplots(), NO_JITTER)
         return
     panels = figure.subplots(3, 1, sharex=True, sharey=True)
-    ticks, sizes = [], []  # a name and (mount, axis) [deg/s] for each stem
-    names, missing = {}, []  # of the frequencies, by their places; of those without a line
+    ticks: list[str] = []
+    sizes: list[np.ndarray] = []  # (mount, axis) [deg/s] of each stem
+    names: dict[float, str] = {}  # of the frequencies, by their middles
+    missing: list[str] = []
     first = next(iter(lines.values()))
     for group in first.by_frequency():
         each = [np.abs([these.amplitude[line] for these in lines.values()]) for line in group]
@@ -144,11 +146,11 @@ def budget(study: JitterStudy) -> Figure:
     panels = figure.subplots(3, 2, sharex=True, sharey="col")
     rotors = np.arange(len(study.gimbal_angle))
     sums = {mount: np.rad2deg(study.combined(mount).worst_case) for mount in LINES}
-    for column, (mount, (label, _)) in enumerate(LINES.items()):
+    for column, (mount, (title, _)) in enumerate(LINES.items()):
         whole = np.rad2deg(np.abs(study.bus_rate(mount))).sum(axis=1)  # (cmg, axis)
         highest = float(np.sum(parts[mount][shown], axis=0).max())
         factor, unit = scaled(highest, "deg/s")
-        panels[0, column].set_title(label)
+        panels[0, column].set_title(title)
         for i, axes in enumerate(panels[:, column]):
             bottom = np.zeros(len(rotors))
             for kind, order in np.argwhere(shown):
@@ -165,7 +167,8 @@ def budget(study: JitterStudy) -> Figure:
                     label=f"{KINDS[kind]}, {ORDERS[order]}Ω",
                 )
                 bottom += height
-            axes.plot(rotors, factor * whole[:, i], "kD", markersize=4, label="each rotor, phases as given")
+            label = "each rotor, phases as given"
+            axes.plot(rotors, factor * whole[:, i], "kD", markersize=4, label=label)
             note = f"all rotors, any phases: {factor * sums[mount][i]:.4g}"
             if mount == "isolated" and sums["rigid"][i] > NOISE:
                 note += f" ({100.0 * sums[mount][i] / sums['rigid'][i]:.3g} %)"

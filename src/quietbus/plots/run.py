@@ -178,9 +178,10 @@ def gimbals(run: xr.Dataset) -> Figure:
 
 def struts(run: xr.Dataset) -> Figure:
     """Strokes and forces of the struts."""
+    slow = ", slow motion" if is_harmonic(run) else ""
     figure = _two_rows(
         run,
-        heading(run, "Struts of the isolation platform"),
+        heading(run, f"Struts of the isolation platform{slow}"),
         [
             (1e3 * run["leg_stroke"].to_numpy(), "stroke [mm]"),
             (run["leg_force"].to_numpy(), "force (tension positive) [N]"),

@@ -18,7 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.flatten_util import ravel_pytree
 
-from quietbus.dynamics.equations import body_mass_matrix
+from quietbus.dynamics.closed_loop import evaluate
 from quietbus.dynamics.state import State
 from quietbus.dynamics.vibration import (
     NOTHING_SEEN,
@@ -38,9 +38,10 @@ from quietbus.spatial.rotation import (
     quaternion_to_matrix,
     rotation_vector_to_quaternion,
 )
+from quietbus.spatial.vector import cross
 
 TOLERANCES = Tolerances(1e-7, 1e-9)  # of the slow motion
-LEG_ERROR = 1e-6  # allowed in the dynamic stiffness at rotor frequency, over its inertia
+LEG_ERROR = 1e-5  # allowed in the legs' mass, damping and stiffness matrices, relative
 INSTANTS = 128  # responses per call, so that progress can be shown and a run stopped
 LEG_INSTANTS = 16  # linearisations of the legs per call
 SPACING = 64  # instants between the legs' first linearisations
@@ -98,7 +99,7 @@ def integrate_harmonic(
     """
     half = progress and (lambda t: progress(0.5 * t))
     if not steady:
-        initial = on_periodic_solution(satellite, initial, -1.0)
+        initial = without_jitter(satellite, initial)
     slow = integrate(satellite, initial, duration, output_rate, tolerances, SLOW, half)
     second = progress and (lambda t: progress(0.5 * (slow.time[-1] + t)))
     if slow.stopped and not slow.interrupted:
@@ -131,59 +132,131 @@ def _growth(satellite: Satellite, slow: Solution) -> str:
     return _growing(_eigenvalues(small, 0, np.zeros(1, int))[0], 0.0)
 
 
-def on_periodic_solution(satellite: Satellite, state: State, sign: float = 1.0) -> State:
-    """The state at t = 0 with the steady jitter added (``sign`` 1) or taken away (-1)."""
+def on_periodic_solution(satellite: Satellite, state: State) -> State:
+    """The state at t = 0 with the steady jitter added, so that a direct run has no transient.
+
+    The jitter's square has a mean, which pushes the satellite out of its equilibrium by about
+    1e-4 of the jitter; the state returned is in the equilibrium with that.
+    """
+    small, xi = _jitter_at(satellite, state)
+    push = np.concatenate([np.asarray(part) for part in _rectified(satellite, state, small, xi)])
+    n, gimbals = len(small.M), len(state.gimbal_angle)
+    a_u, a_gimbal, a_integral = np.split(push, [12, 12 + gimbals])
+    accelerations = a_u if small.projection is None else a_u[6:]
+    memory = np.zeros(0)
+    if small.control is not None:
+        memory = np.concatenate([np.zeros(gimbals), a_gimbal, a_integral])
+    b = np.concatenate([np.zeros(n), accelerations, memory])
+    offset = np.linalg.lstsq(small.state_matrix(), -b, rcond=1e-13)[0]
+    pose = offset[:n] if small.projection is None else small.projection @ offset[:n]
+    if small.control is not None:
+        angle, _, integral = np.split(offset[2 * n :], [gimbals, 2 * gimbals])
+    else:
+        angle, integral = np.zeros(gimbals), np.zeros(3)
+    moved = _displaced(state, pose, np.zeros(12), angle, 0.0 * angle, integral)
+    return _with_jitter(satellite, moved, small, xi, satellite.cluster.rotor_phase)
+
+
+def without_jitter(satellite: Satellite, state: State) -> State:
+    """The slow motion's state at t = 0, from the true one."""
+    small, xi = _jitter_at(satellite, state)
+    return _with_jitter(satellite, state, small, -xi, satellite.cluster.rotor_phase)
+
+
+def _jitter_at(satellite: Satellite, state: State) -> tuple[Vibration, np.ndarray]:
+    """Equations of small vibration at t = 0 and xi (cmg, order, 12)."""
     states = jax.tree.map(lambda leaf: np.asarray(leaf)[None], state)
-    along = _Along(satellite, np.zeros(1), states)
-    _, xi, small = along.chunk(np.zeros(1, int), NOTHING_SEEN)
-    small = jax.tree.map(lambda leaf: leaf[0], small)
-    angle = rate = np.zeros(len(state.gimbal_angle))
-    pose = pose_rate = np.zeros(12)
-    integral = np.zeros(3)
-    turning = np.asarray(small.turning)
-    for j, (phase, speed) in enumerate(_rotors(satellite)):
-        for order, h in enumerate(ORDERS):
-            s, now = 1j * h * speed, sign * xi[0, j, order] * np.exp(1j * h * phase)
-            pose = pose + now.real
-            pose_rate = pose_rate + (now.reshape(4, 3) @ (s * np.eye(3) + turning).T).real.ravel()
-            if small.control is not None and speed != 0.0:
-                moved = np.asarray(small.memory(s)) @ now[9:]
-                angle = angle + moved[:-3].real
-                rate = rate + (s * moved[:-3]).real
-                integral = integral + moved[-3:].real
-    return _displaced(state, pose, pose_rate, angle, rate, integral)
+    _, xi, small = _Along(satellite, np.zeros(1), states).chunk(np.zeros(1, int), NOTHING_SEEN)
+    return jax.tree.map(lambda leaf: leaf[0], small), xi[0]
 
 
-def _rotors(satellite: Satellite) -> list[tuple[float, float]]:
-    """Phase [rad] and speed [rad/s] of each rotor."""
-    cluster = satellite.cluster
-    return list(
-        zip(
-            *(np.asarray(v).tolist() for v in (cluster.rotor_phase, cluster.rotor_speed)),
-            strict=True,
+@eqx.filter_jit
+def _with_jitter(satellite, state, small, xi, phase):
+    """The state with the jitter xi (cmg, order, 12) at rotor angles ``phase``."""
+    speed, n = satellite.cluster.rotor_speed, len(state.gimbal_angle)
+
+    def one(h, speed, phase, xi):
+        s, now = 1j * h * speed, xi * jnp.exp(1j * h * phase)
+        rate = now.reshape(4, 3) @ (s * jnp.eye(3) + small.turning).T
+        memory = jnp.zeros(n + 3, complex)
+        if small.control is not None:
+            memory = small.memory(jnp.where(speed == 0.0, 1j, s)) @ now[9:]
+        return now, rate.reshape(12), memory[:n], s * memory[:n], memory[n:]
+
+    over_orders = jax.vmap(one, (0, None, None, 0))
+    moved = jax.vmap(over_orders, (None, 0, 0, 0))(jnp.array(ORDERS), speed, phase, xi)
+    return _displaced(state, *(jnp.sum(part.real, axis=(0, 1)) for part in moved))
+
+
+@eqx.filter_jit
+def _rectified(satellite, state, small, xi):
+    """Mean of what the jitter's square adds to accelerations (bus axes), gimbals' and integral's.
+
+    Lines of different frequency have no mean product, so that rotors of each speed are taken by
+    themselves, over ``TURNS`` equally spaced angles.
+    """
+    moments = ClusterMoments.expand(satellite.cluster)
+    averaged = moments.averaged()
+    speed, phase = satellite.cluster.rotor_speed, satellite.cluster.rotor_phase
+    R_BN = quaternion_to_matrix(state.q_NB).T
+
+    def rates(state, phi, moments):
+        signals, a = evaluate(satellite, jnp.zeros(()), state, phi, moments)
+        u_rate = jnp.stack([a.v_P, a.w_P, a.v_B, a.w_B]) @ R_BN.T
+        return u_rate.reshape(12), signals.gimbal_acceleration, signals.integral_rate
+
+    def shaken(first, turn):
+        same = speed == speed[first]
+        # a speed that an earlier rotor has is done
+        same = same & (jnp.argmax(same) == first)
+        part = jax.tree.map(
+            lambda all_, mean: (
+                jnp.where(same[:, None, None], all_, mean) if all_.ndim == 4 else all_
+            ),
+            moments,
+            averaged,
         )
+        phi = phase + turn * jnp.sign(speed)
+        moved = _with_jitter(satellite, state, small, jnp.where(same[:, None, None], xi, 0.0), phi)
+        return rates(moved, phi, part)
+
+    turns = 2.0 * jnp.pi / TURNS * jnp.arange(TURNS)
+    over_turns = jax.vmap(shaken, (None, 0))
+    all_ = jax.vmap(over_turns, (0, None))(jnp.arange(len(speed)), turns)
+    still = rates(state, phase, averaged)
+    return tuple(
+        jnp.sum(jnp.mean(part, axis=1) - rest, axis=0)
+        for part, rest in zip(all_, still, strict=True)
     )
 
 
-def _displaced(state: State, pose, pose_rate, angle, rate, integral) -> State:
+TURNS = 16  # angles over which products of orders up to 2 are averaged
+
+
+def _displaced(state: State, pose, pose_rate, angle, angle_rate, integral) -> State:
     """The state moved by small (r_P, theta_P, r_B, theta_B) along bus axes and by the others."""
     R_NB, R_NP = quaternion_to_matrix(state.q_NB), quaternion_to_matrix(state.q_NP)
     r_P, theta_P, r_B, theta_B = pose.reshape(4, 3) @ R_NB.T
     v_P, w_P, v_B, w_B = pose_rate.reshape(4, 3) @ R_NB.T
-    turned = lambda q, R, theta: quaternion_multiply(  # noqa: E731
-        q, rotation_vector_to_quaternion(R.T @ theta)
-    )
+
+    def turned(q, R, theta):
+        return quaternion_multiply(q, rotation_vector_to_quaternion(R.T @ theta))
+
+    def rate(R, theta, theta_rate):
+        """Body axes turn with theta, so that to second order half a vector product comes off."""
+        return R.T @ (theta_rate - 0.5 * cross(theta, theta_rate))
+
     return State(
         p_NB_N=state.p_NB_N + r_B,
         q_NB=turned(state.q_NB, R_NB, theta_B),
         p_NP_N=state.p_NP_N + r_P,
         q_NP=turned(state.q_NP, R_NP, theta_P),
         v_NB_N=state.v_NB_N + v_B,
-        w_NB_B=state.w_NB_B + R_NB.T @ w_B,
+        w_NB_B=state.w_NB_B + rate(R_NB, theta_B, w_B),
         v_NP_N=state.v_NP_N + v_P,
-        w_NP_P=state.w_NP_P + R_NP.T @ w_P,
+        w_NP_P=state.w_NP_P + rate(R_NP, theta_P, w_P),
         gimbal_angle=state.gimbal_angle + angle,
-        gimbal_rate=state.gimbal_rate + rate,
+        gimbal_rate=state.gimbal_rate + angle_rate,
         error_integral=state.error_integral + integral,
     )
 
@@ -247,11 +320,8 @@ class _Along:
 
     def __init__(self, satellite: Satellite, time: np.ndarray, states: State):
         self.satellite, self.time, self.states = satellite, time, states
-        speeds = np.abs(np.asarray(satellite.cluster.rotor_speed))
         self.one_speed = len(np.unique(np.asarray(satellite.cluster.rotor_speed))) == 1
-        self.slowest = float(np.min(speeds[speeds > 0.0], initial=np.inf))
         self.known: dict[int, np.ndarray] = {}
-        self.inertia = np.ones(12)
         self._sample_legs()
 
     def chunk(self, instants: np.ndarray, view: View) -> tuple[dict[str, np.ndarray], Vibration]:
@@ -280,7 +350,7 @@ class _Along:
             open_ = [
                 part
                 for (a, b), m, guessed in zip(open_, middles, guess, strict=True)
-                if self._error(guessed - self.known[m]) > LEG_ERROR
+                if _relative_change(guessed, self.known[m]) > LEG_ERROR
                 for part in ((a, m), (m, b))
                 if part[1] - part[0] > 1
             ]
@@ -290,20 +360,12 @@ class _Along:
     def _linearize(self, instants):
         for start in range(0, len(instants), LEG_INSTANTS):
             these = instants[start : start + LEG_INSTANTS]
-            values, inertia = _compiled_legs(self.satellite, *self._at(these, LEG_INSTANTS))
-            self.inertia = np.asarray(inertia)[0]
+            values = _compiled_legs(self.satellite, *self._at(these, LEG_INSTANTS))
             self.known |= zip(these.tolist(), np.asarray(values), strict=False)
 
     def _between(self, a, b, m):
         part = (m - a) / (b - a)
         return (1.0 - part) * self.known[a] + part * self.known[b]
-
-    def _error(self, difference) -> float:
-        """Size of a change of the legs' coefficients against the inertia forces of the jitter."""
-        M, by_pose, by_speed = difference[: 3 * 144].reshape(3, 12, 12)
-        w = self.slowest
-        change = np.abs(M) + np.abs(by_speed) / w + np.abs(by_pose) / w**2
-        return float(np.max(change / np.sqrt(np.outer(self.inertia, self.inertia))))
 
     def _legs(self, instants):
         right = np.clip(np.searchsorted(self.nodes, instants), 1, max(len(self.nodes) - 1, 1))
@@ -315,17 +377,22 @@ class _Along:
         return (1.0 - part) * self.values[left] + part * self.values[right]
 
 
+def _relative_change(guessed: np.ndarray, true: np.ndarray) -> float:
+    """Of the legs' mass, stiffness and damping, each against its own largest entry."""
+    parts = lambda row: row[: 3 * 144].reshape(3, 144)  # noqa: E731
+    error = np.max(np.abs(parts(guessed) - parts(true)), axis=1)
+    return float(np.max(error / np.maximum(np.max(np.abs(parts(true)), axis=1), 1e-300)))
+
+
 @eqx.filter_jit
 def _compiled_legs(satellite, t, states):
-    """The legs' coefficients as one row per instant, and the inertia of the bodies (12,)."""
+    """The legs' coefficients as one row per instant."""
     averaged = ClusterMoments.expand(satellite.cluster).averaged()
 
     def one(t, state):
-        slow = slow_motion(satellite, t, state, averaged)
-        still = jnp.zeros_like(state.gimbal_angle)
-        carried = averaged.at(state.gimbal_angle, still, still, still)
-        inertia = jnp.diag(body_mass_matrix(satellite, slow.plates, carried))
-        return ravel_pytree(leg_coefficients(satellite, slow))[0], inertia
+        return ravel_pytree(
+            leg_coefficients(satellite, slow_motion(satellite, t, state, averaged))
+        )[0]
 
     return jax.vmap(one)(t, states)
 
