@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Callable, Mapping
 from typing import Literal
 
+import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
@@ -287,8 +288,8 @@ def _harmonic(
         if not np.any(direction):
             raise ValueError(f"lines_of_sight[{name!r}]: expected a direction, got zero")
     view = View(
-        np.array(at).reshape(-1, 3),
-        np.array([d / np.linalg.norm(d) for d in along]).reshape(-1, 3),
+        jnp.asarray(np.array(at).reshape(-1, 3)),
+        jnp.asarray(np.array([d / np.linalg.norm(d) for d in along]).reshape(-1, 3)),
     )
     started = time.perf_counter()
     satellite = build_satellite(scenario)

@@ -35,8 +35,14 @@ MOUNTS = ("isolated", "rigid")
 AT_REST = 1e-6  # [m/s^2, rad/s^2] accelerations smaller than this are none
 ARCSEC = np.rad2deg(1.0) * 3600.0
 # differences of the scenario's algebra: offsets in steps and weights
-_CENTRAL = ((-3, -2, -1, 1, 2, 3), np.array([-1, 9, -45, 45, -9, 1]) / 60.0)
-_FORWARD = ((0, 1, 2, 3, 4), np.array([-25, 48, -36, 16, -3]) / 12.0)
+_CENTRAL: tuple[tuple[int, ...], np.ndarray] = (
+    (-3, -2, -1, 1, 2, 3),
+    np.array([-1, 9, -45, 45, -9, 1]) / 60.0,
+)
+_FORWARD: tuple[tuple[int, ...], np.ndarray] = (
+    (0, 1, 2, 3, 4),
+    np.array([-25, 48, -36, 16, -3]) / 12.0,
+)
 
 
 @dataclass(frozen=True)

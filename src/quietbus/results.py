@@ -221,7 +221,7 @@ def reconstruct(
     Raises:
         ValueError: a run that is not harmonic, an unknown name, or times outside the run.
     """
-    known = [n.removesuffix("_jitter_phase") for n in run if str(n).endswith("_jitter_phase")]
+    known = [each for each in JITTER_VARIABLES if f"{each}_jitter_phase" in run]
     if name not in known:
         raise ValueError(
             f"the run has no jitter of {name!r}; "

@@ -278,8 +278,8 @@ def jitter_tables(numbers: Mapping[str, Any]) -> Iterator[Table]:
         parts.add_column(column, justify="left" if column == "kind" else "right")
     for part in numbers["budget"][own]:
         if max(part["bus_rate_amplitude_deg_s"]) > NOISE:
-            values = (f"{value:.3e}" for value in part["bus_rate_amplitude_deg_s"])
-            parts.add_row(str(part["cmg"]), part["kind"], str(part["order"]), *values)
+            cells = [f"{value:.3e}" for value in part["bus_rate_amplitude_deg_s"]]
+            parts.add_row(str(part["cmg"]), part["kind"], str(part["order"]), *cells)
     parts.caption = f"parts below {NOISE:g} deg/s left out"
     yield parts
 

@@ -41,6 +41,7 @@ def synthetic(mount="isolated", count=4000, rate=1000.0, cmgs=4, legs=6, status=
     data["bus_rate"] = (("time", "axis"), [SLOW, 0, 0] + wave[:, None] * AMPLITUDE[mount])
     attributes = {
         "title": f"zhang2012, {mount}",
+        "method": "direct",
         "mount": mount,
         "status": status,
         "scenario": scenario.to_yaml(),

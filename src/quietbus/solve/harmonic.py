@@ -4,12 +4,11 @@ The slow motion is integrated with the rotors' imbalance averaged over their tur
 instant the response to every order of every rotor follows from one complex linear solve with the
 equations of small vibration about the slow motion (``dynamics.vibration``).
 
-The legs' part of these equations costs most and changes least. It is computed at chosen instants,
-so densely that linear interpolation between them is exact to ``LEG_ERROR``.
+The legs' part of these equations costs most and changes least. It is computed at some instants,
+so dense that the path of the plate in the bus is straight in between, and interpolated.
 """
 
-import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import equinox as eqx
@@ -17,6 +16,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.flatten_util import ravel_pytree
+from scipy.spatial.transform import Rotation
 
 from quietbus.dynamics.closed_loop import evaluate
 from quietbus.dynamics.state import State
@@ -41,11 +41,10 @@ from quietbus.spatial.rotation import (
 from quietbus.spatial.vector import cross
 
 TOLERANCES = Tolerances(1e-7, 1e-9)  # of the slow motion
-LEG_ERROR = 1e-5  # allowed in the legs' mass, damping and stiffness matrices, relative
+LEG_ERROR = 1e-5  # [m, rad] of the plate's pose between the legs' linearisations
 INSTANTS = 128  # responses per call, so that progress can be shown and a run stopped
 LEG_INSTANTS = 16  # linearisations of the legs per call
-SPACING = 64  # instants between the legs' first linearisations
-LOOKS = 16  # instants at the most at which the modes are computed
+LOOKS = 8  # instants at the most at which the modes are computed
 SLOW_CHANGE = 0.05  # largest estimated error of the jitter that needs no warning
 ON_A_MODE = 1e-8  # relative distance from a mode at which the response counts as infinite
 
@@ -104,6 +103,7 @@ def integrate_harmonic(
     second = progress and (lambda t: progress(0.5 * (slow.time[-1] + t)))
     if slow.stopped and not slow.interrupted:
         slow = replace(slow, stopped=f"{slow.stopped}. {_growth(satellite, slow)}".strip())
+    assert slow.states is not None
     jitter, done = respond(satellite, slow.time, slow.states, view, second)
     if done < len(slow.time):
         slow = _cut(slow, done)
@@ -135,45 +135,71 @@ def _growth(satellite: Satellite, slow: Solution) -> str:
 def on_periodic_solution(satellite: Satellite, state: State) -> State:
     """The state at t = 0 with the steady jitter added, so that a direct run has no transient.
 
-    The jitter's square has a mean, which pushes the satellite out of its equilibrium by about
-    1e-4 of the jitter; the state returned is in the equilibrium with that.
+    To second order: the jitter's square has a mean, which moves the equilibrium, and multiples of
+    rotor speed, which move the satellite too (docs/theory.md, section 14).
     """
     small, xi = _jitter_at(satellite, state)
-    push = np.concatenate([np.asarray(part) for part in _rectified(satellite, state, small, xi)])
-    n, gimbals = len(small.M), len(state.gimbal_angle)
-    a_u, a_gimbal, a_integral = np.split(push, [12, 12 + gimbals])
-    accelerations = a_u if small.projection is None else a_u[6:]
-    memory = np.zeros(0)
-    if small.control is not None:
-        memory = np.concatenate([np.zeros(gimbals), a_gimbal, a_integral])
-    b = np.concatenate([np.zeros(n), accelerations, memory])
-    offset = np.linalg.lstsq(small.state_matrix(), -b, rcond=1e-13)[0]
-    pose = offset[:n] if small.projection is None else small.projection @ offset[:n]
-    if small.control is not None:
-        angle, _, integral = np.split(offset[2 * n :], [gimbals, 2 * gimbals])
-    else:
-        angle, integral = np.zeros(gimbals), np.zeros(3)
-    moved = _displaced(state, pose, np.zeros(12), angle, 0.0 * angle, integral)
-    return _with_jitter(satellite, moved, small, xi, satellite.cluster.rotor_phase)
+    first = _motions(satellite, small, xi, satellite.cluster.rotor_phase)
+    second = [np.zeros_like(part) for part in first]
+    speeds = np.abs(np.asarray(satellite.cluster.rotor_speed))
+    for speed in np.unique(speeds[speeds > 0.0]):
+        square = _jitter_squared(satellite, state, small, xi, speeds == speed)
+        for part, moved in zip(second, _answer_to_square(small, square, speed), strict=True):
+            part += moved
+    return _displaced(state, *map(np.add, first, second))
+
+
+def _answer_to_square(small: Vibration, square: Sequence[np.ndarray], speed: float):
+    """Motion at t = 0, as of ``_motions``, that the jitter's square causes at multiples of speed.
+
+    Args:
+        square: over ``TURNS`` angles, accelerations (12,), gimbals' and rate of the integral.
+    """
+    u_rate, gimbal, integral = (np.fft.rfft(part, axis=0) / TURNS for part in square)
+    T, n, gimbals = small.projection, len(small.M), gimbal.shape[1]
+    pushed = u_rate if T is None else u_rate[:, 6:]  # a rigid mount's follow those of the bus
+    memory = np.concatenate([0.0 * gimbal, gimbal, integral], axis=1)
+    if small.control is None:
+        memory = memory[:, :0]
+    A = small.state_matrix()
+    whole = lambda xi: xi if T is None else T @ xi  # noqa: E731
+    turning = np.asarray(small.turning)
+    pose, pose_rate = np.zeros(12), np.zeros(12)
+    moved = np.zeros(memory.shape[1])
+    for m in range(TURNS // 2):
+        b = np.concatenate([np.zeros(n), pushed[m], memory[m]])
+        if m == 0:  # A is singular where nothing holds the satellite
+            x = np.linalg.lstsq(A, -b.real, rcond=1e-13)[0]
+        else:
+            x = 2.0 * np.linalg.solve(1j * m * speed * np.eye(len(A)) - A, b)
+        xi, rate = (whole(part).reshape(4, 3) for part in (x[:n], x[n : 2 * n]))
+        pose = pose + xi.real.ravel()
+        pose_rate = pose_rate + (rate + xi @ turning.T).real.ravel()
+        moved = moved + x[2 * n :].real
+    if small.control is None:
+        moved = np.zeros(2 * gimbals + 3)
+    return pose, pose_rate, *np.split(moved, [gimbals, 2 * gimbals])
 
 
 def without_jitter(satellite: Satellite, state: State) -> State:
     """The slow motion's state at t = 0, from the true one."""
     small, xi = _jitter_at(satellite, state)
-    return _with_jitter(satellite, state, small, -xi, satellite.cluster.rotor_phase)
+    return _displaced(state, *_motions(satellite, small, -xi, satellite.cluster.rotor_phase))
 
 
 def _jitter_at(satellite: Satellite, state: State) -> tuple[Vibration, np.ndarray]:
     """Equations of small vibration at t = 0 and xi (cmg, order, 12)."""
     states = jax.tree.map(lambda leaf: np.asarray(leaf)[None], state)
     _, xi, small = _Along(satellite, np.zeros(1), states).chunk(np.zeros(1, int), NOTHING_SEEN)
-    return jax.tree.map(lambda leaf: leaf[0], small), xi[0]
+    small = jax.tree.map(lambda leaf: leaf[0], small)
+    refuse_resonance(satellite, "at t = 0 s", np.linalg.eigvals(small.state_matrix()))
+    return small, xi[0]
 
 
 @eqx.filter_jit
-def _with_jitter(satellite, state, small, xi, phase):
-    """The state with the jitter xi (cmg, order, 12) at rotor angles ``phase``."""
-    speed, n = satellite.cluster.rotor_speed, len(state.gimbal_angle)
+def _motions(satellite, small, xi, phase):
+    """Pose, its rate, gimbal angles, their rates and integral of jitter xi at rotor angles."""
+    n = len(phase)
 
     def one(h, speed, phase, xi):
         s, now = 1j * h * speed, xi * jnp.exp(1j * h * phase)
@@ -184,50 +210,50 @@ def _with_jitter(satellite, state, small, xi, phase):
         return now, rate.reshape(12), memory[:n], s * memory[:n], memory[n:]
 
     over_orders = jax.vmap(one, (0, None, None, 0))
-    moved = jax.vmap(over_orders, (None, 0, 0, 0))(jnp.array(ORDERS), speed, phase, xi)
-    return _displaced(state, *(jnp.sum(part.real, axis=(0, 1)) for part in moved))
+    moved = jax.vmap(over_orders, (None, 0, 0, 0))(
+        jnp.array(ORDERS), satellite.cluster.rotor_speed, phase, xi
+    )
+    return tuple(jnp.sum(part.real, axis=(0, 1)) for part in moved)
 
 
 @eqx.filter_jit
-def _rectified(satellite, state, small, xi):
-    """Mean of what the jitter's square adds to accelerations (bus axes), gimbals' and integral's.
+def _jitter_squared(satellite, state, small, xi, same):
+    """What rates have beyond first order in the jitter of some rotors, at ``TURNS`` angles.
 
-    Lines of different frequency have no mean product, so that rotors of each speed are taken by
-    themselves, over ``TURNS`` equally spaced angles.
+    Lines of different frequency have no steady product, so that rotors of each speed (``same``)
+    are taken by themselves. Accelerations (12,) are along bus axes.
     """
     moments = ClusterMoments.expand(satellite.cluster)
     averaged = moments.averaged()
     speed, phase = satellite.cluster.rotor_speed, satellite.cluster.rotor_phase
     R_BN = quaternion_to_matrix(state.q_NB).T
+    chosen = lambda all_, mean: jnp.where(same[:, None, None], all_, mean)  # noqa: E731
+    kinds = lambda m: (m.c_H, m.J, m.H_gimbal)  # noqa: E731
+    shaking = eqx.tree_at(kinds, averaged, tuple(map(chosen, kinds(moments), kinds(averaged))))
+    xi = jnp.where(same[:, None, None], xi, 0.0)
+    s = 1j * speed[:, None] * jnp.array(ORDERS)
+    spin = jax.vmap(jax.vmap(lambda s: s * jnp.eye(3) + small.turning))(s)
+    xi_rate = jnp.einsum("joab,jocb->joca", spin, xi.reshape(*xi.shape[:2], 4, 3))
+    xi_second = jnp.einsum("joab,jocb->joca", spin, xi_rate).reshape(xi.shape)
 
     def rates(state, phi, moments):
         signals, a = evaluate(satellite, jnp.zeros(()), state, phi, moments)
         u_rate = jnp.stack([a.v_P, a.w_P, a.v_B, a.w_B]) @ R_BN.T
         return u_rate.reshape(12), signals.gimbal_acceleration, signals.integral_rate
 
-    def shaken(first, turn):
-        same = speed == speed[first]
-        # a speed that an earlier rotor has is done
-        same = same & (jnp.argmax(same) == first)
-        part = jax.tree.map(
-            lambda all_, mean: (
-                jnp.where(same[:, None, None], all_, mean) if all_.ndim == 4 else all_
-            ),
-            moments,
-            averaged,
-        )
+    def beyond(turn):
         phi = phase + turn * jnp.sign(speed)
-        moved = _with_jitter(satellite, state, small, jnp.where(same[:, None, None], xi, 0.0), phi)
-        return rates(moved, phi, part)
+        now = _motions(satellite, small, xi, phi)
+        true = rates(_displaced(state, *now), phi, shaking)
+        still = rates(state, phi, averaged)
+        # first order: time derivatives of the motion
+        turned = jnp.exp(1j * phi[:, None] * jnp.array(ORDERS))[..., None]
+        accelerations = jnp.sum((xi_second * turned).real, axis=(0, 1))
+        changing = _motions(satellite, small, xi * s[..., None], phi)
+        known = (accelerations, changing[3], changing[4])
+        return tuple(t - still_ - k for t, still_, k in zip(true, still, known, strict=True))
 
-    turns = 2.0 * jnp.pi / TURNS * jnp.arange(TURNS)
-    over_turns = jax.vmap(shaken, (None, 0))
-    all_ = jax.vmap(over_turns, (0, None))(jnp.arange(len(speed)), turns)
-    still = rates(state, phase, averaged)
-    return tuple(
-        jnp.sum(jnp.mean(part, axis=1) - rest, axis=0)
-        for part, rest in zip(all_, still, strict=True)
-    )
+    return jax.vmap(beyond)(2.0 * jnp.pi / TURNS * jnp.arange(TURNS))
 
 
 TURNS = 16  # angles over which products of orders up to 2 are averaged
@@ -315,22 +341,25 @@ def respond(
     return Jitter(amplitudes, error, tuple(said)), done
 
 
+Chunk = tuple[dict[str, np.ndarray], np.ndarray, Vibration]
+
+
 class _Along:
     """Responses at instants of a slow motion; the legs' linearisation sampled as far as needed."""
 
     def __init__(self, satellite: Satellite, time: np.ndarray, states: State):
         self.satellite, self.time, self.states = satellite, time, states
         self.one_speed = len(np.unique(np.asarray(satellite.cluster.rotor_speed))) == 1
-        self.known: dict[int, np.ndarray] = {}
         self._sample_legs()
 
-    def chunk(self, instants: np.ndarray, view: View) -> tuple[dict[str, np.ndarray], Vibration]:
+    def chunk(self, instants: np.ndarray, view: View) -> Chunk:
         """Complex amplitudes (instant, cmg, order, ...) and the equations that they solve."""
         t, states = self._at(instants, INSTANTS if len(self.time) > 1 else 1)
         legs = self._legs(instants)
         legs = np.concatenate([legs, np.repeat(legs[-1:], len(t) - len(legs), axis=0)])
         result = _compiled_chunk(self.satellite, t, states, legs, view, self.one_speed)
-        return jax.tree.map(lambda leaf: np.asarray(leaf)[: len(instants)], result)
+        trimmed: Chunk = jax.tree.map(lambda leaf: np.asarray(leaf)[: len(instants)], result)
+        return trimmed
 
     def _at(self, instants, size):
         """Time and states at instants, the last one repeated to a size that programs share."""
@@ -338,50 +367,68 @@ class _Along:
         return self.time[padded], jax.tree.map(lambda leaf: leaf[padded], self.states)
 
     def _sample_legs(self):
-        """Linearise the legs at so many instants that interpolation is good (see the module)."""
-        last = len(self.time) - 1
-        edges = np.unique(np.append(np.arange(0, last, SPACING), last))
-        self._linearize(edges)
-        open_ = [(a, b) for a, b in itertools.pairwise(edges) if b - a > 1]
-        while open_:
-            middles = [(a + b) // 2 for a, b in open_]
-            guess = [self._between(a, b, m) for (a, b), m in zip(open_, middles, strict=True)]
-            self._linearize(np.array(middles))
-            open_ = [
-                part
-                for (a, b), m, guessed in zip(open_, middles, guess, strict=True)
-                if _relative_change(guessed, self.known[m]) > LEG_ERROR
-                for part in ((a, m), (m, b))
-                if part[1] - part[0] > 1
-            ]
-        self.nodes = np.array(sorted(self.known))
-        self.values = np.stack([self.known[node] for node in self.nodes])
-
-    def _linearize(self, instants):
-        for start in range(0, len(instants), LEG_INSTANTS):
-            these = instants[start : start + LEG_INSTANTS]
+        """Linearise the legs where interpolation between neighbours would not do."""
+        self.nodes = _nodes(_configuration(self.satellite, self.states), LEG_ERROR)
+        rows = []
+        for start in range(0, len(self.nodes), LEG_INSTANTS):
+            these = self.nodes[start : start + LEG_INSTANTS]
             values = _compiled_legs(self.satellite, *self._at(these, LEG_INSTANTS))
-            self.known |= zip(these.tolist(), np.asarray(values), strict=False)
-
-    def _between(self, a, b, m):
-        part = (m - a) / (b - a)
-        return (1.0 - part) * self.known[a] + part * self.known[b]
+            rows.append(np.asarray(values)[: len(these)])
+        self.values = np.concatenate(rows)
 
     def _legs(self, instants):
-        right = np.clip(np.searchsorted(self.nodes, instants), 1, max(len(self.nodes) - 1, 1))
+        """The legs' coefficients at instants, interpolated."""
         if len(self.nodes) == 1:
-            return self.values[np.zeros(len(instants), int)]
+            return np.repeat(self.values, len(instants), axis=0)
+        right = np.clip(np.searchsorted(self.nodes, instants), 1, len(self.nodes) - 1)
         left = right - 1
         span = self.nodes[right] - self.nodes[left]
         part = ((instants - self.nodes[left]) / span)[:, None]
         return (1.0 - part) * self.values[left] + part * self.values[right]
 
 
-def _relative_change(guessed: np.ndarray, true: np.ndarray) -> float:
-    """Of the legs' mass, stiffness and damping, each against its own largest entry."""
-    parts = lambda row: row[: 3 * 144].reshape(3, 144)  # noqa: E731
-    error = np.max(np.abs(parts(guessed) - parts(true)), axis=1)
-    return float(np.max(error / np.maximum(np.max(np.abs(parts(true)), axis=1), 1e-300)))
+def _configuration(satellite: Satellite, states: State) -> np.ndarray:
+    """What the legs' equations depend on (n, 12): pose of the plate in the bus, and rates.
+
+    In shares of a metre, a radian, and of the slowest rotor's speed.
+    """
+    bus, plate = (Rotation.from_quat(np.roll(q, -1, axis=1)) for q in (states.q_NB, states.q_NP))
+    speeds = np.abs(np.asarray(satellite.cluster.rotor_speed))
+    slowest = np.min(speeds[speeds > 0.0], initial=1e3)
+    return np.concatenate(
+        [
+            bus.inv().apply(states.p_NP_N - states.p_NB_N),
+            (bus.inv() * plate).as_rotvec(),
+            np.asarray(states.w_NB_B) / slowest,
+            np.asarray(states.w_NP_P) / slowest,
+        ],
+        axis=1,
+    )
+
+
+def _nodes(path: np.ndarray, error: float) -> np.ndarray:
+    """Instants between which a path (n, m) is straight to ``error``, ends included, ascending.
+
+    A function of the path that is as curved as the square of its length is then interpolated as
+    well: a stretch is no longer than ``sqrt(8 error)``.
+    """
+    last = len(path) - 1
+    nodes, open_ = {0, last}, [(0, last)]
+    while open_:
+        a, b = open_.pop()
+        if b - a < 2:
+            continue
+        part = np.arange(1, b - a) / (b - a)
+        straight = path[a] + part[:, None] * (path[b] - path[a])
+        off = np.max(np.abs(path[a + 1 : b] - straight), axis=1)
+        middle = a + 1 + int(np.argmax(off))
+        if np.max(off) <= error:
+            if np.max(np.abs(path[b] - path[a])) <= np.sqrt(8.0 * error):
+                continue
+            middle = (a + b) // 2
+        nodes.add(middle)
+        open_ += [(a, middle), (middle, b)]
+    return np.array(sorted(nodes))
 
 
 @eqx.filter_jit
@@ -417,8 +464,11 @@ def _compiled_chunk(satellite, t, states, legs, view, one_speed):
 
 def _eigenvalues(small: Vibration, start: int, looks: np.ndarray) -> dict[int, np.ndarray]:
     """Eigenvalues [rad/s] of the controlled satellite at instants of a chunk."""
+    if not looks.size:
+        return {}
     at = lambda look: jax.tree.map(lambda leaf: leaf[look - start], small)  # noqa: E731
-    return {int(look): np.linalg.eigvals(at(look).state_matrix()) for look in looks}
+    matrices = np.stack([at(look).state_matrix() for look in looks])
+    return dict(zip(looks.tolist(), np.linalg.eigvals(matrices), strict=True))
 
 
 def refuse_resonance(satellite: Satellite, where: str, eigenvalues: np.ndarray) -> None:
