@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import json
 import re
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Self
@@ -61,6 +63,12 @@ def _none_word(value: Any) -> Any:
     if value is None or value is False:  # a forgotten value; YAML reads "off" as false
         raise expected("none, or a mapping with keys among pid, steering, ...", value)
     return None if value == "none" else value
+
+
+@functools.lru_cache(maxsize=64)
+def _yaml_text(data: str) -> str:
+    """YAML of a scenario's JSON; kept, since writing it takes long beside a harmonic run."""
+    return write_yaml(json.loads(data))
 
 
 def _keys(path: str) -> list[str | int]:
@@ -134,7 +142,7 @@ class Scenario(Part):
 
     def to_yaml(self) -> str:
         """YAML text in SI units that gives this scenario again."""
-        return write_yaml(self.to_dict())
+        return _yaml_text(json.dumps(self.to_dict()))
 
     def with_overrides(self, overrides: Mapping[str, Any]) -> Self:
         """A checked copy with some fields changed.

@@ -184,7 +184,12 @@ def _answer_to_square(small: Vibration, square: Sequence[np.ndarray], speed: flo
 def without_jitter(satellite: Satellite, state: State) -> State:
     """The slow motion's state at t = 0, from the true one."""
     small, xi = _jitter_at(satellite, state)
-    return _displaced(state, *_motions(satellite, small, -xi, satellite.cluster.rotor_phase))
+    return _moved_by(satellite, state, small, -xi)
+
+
+@eqx.filter_jit
+def _moved_by(satellite, state, small, xi):
+    return _displaced(state, *_motions(satellite, small, xi, satellite.cluster.rotor_phase))
 
 
 def _jitter_at(satellite: Satellite, state: State) -> tuple[Vibration, np.ndarray]:
