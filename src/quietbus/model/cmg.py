@@ -145,8 +145,11 @@ class ClusterMoments(eqx.Module):
         return cls(mass, cluster.rotor_speed, *moments)
 
     def averaged(self) -> "ClusterMoments":
-        """The moments averaged over the rotor angles: the imbalance's rotating part is gone."""
-        constant = lambda coefficients: coefficients.at[..., 1:].set(0.0)  # noqa: E731
+        """The moments averaged over the rotor angles: the imbalance's rotating part is gone.
+
+        Only the constant of the rotor basis is left, on an axis of length one.
+        """
+        constant = lambda coefficients: coefficients[..., :1]  # noqa: E731
         return ClusterMoments(
             self.mass,
             self.rotor_speed,
@@ -163,7 +166,7 @@ class ClusterMoments(eqx.Module):
         gamma_acceleration: Float[Array, " cmg"],
     ) -> CarriedMotion:
         """Moments and rates at gimbal and rotor angles [rad], gimbal rates and accelerations."""
-        g, f = _basis(gamma)[:, :, :, None], _basis(phi)[:, :, None, :]
+        g, f = _basis(gamma)[:, :, :, None], _basis(phi)[:, :, None, : self.J.shape[-1]]
         rate, speed = gamma_rate[:, None, None], self.rotor_speed[:, None, None]
         acceleration = gamma_acceleration[:, None, None]
         # the products of both bases, and their first and second time derivatives

@@ -42,7 +42,7 @@ from quietbus.spatial.vector import cross
 
 TOLERANCES = Tolerances(1e-7, 1e-9)  # of the slow motion
 LEG_ERROR = 1e-5  # [m, rad] of the plate's pose between the legs' linearisations
-INSTANTS = 128  # responses per call, so that progress can be shown and a run stopped
+INSTANTS = 256  # responses per call, so that progress can be shown and a run stopped
 LEG_INSTANTS = 16  # linearisations of the legs per call
 LOOKS = 8  # instants at the most at which the modes are computed
 SLOW_CHANGE = 0.05  # largest estimated error of the jitter that needs no warning
@@ -232,9 +232,9 @@ def _jitter_squared(satellite, state, small, xi, same):
     averaged = moments.averaged()
     speed, phase = satellite.cluster.rotor_speed, satellite.cluster.rotor_phase
     R_BN = quaternion_to_matrix(state.q_NB).T
-    chosen = lambda all_, mean: jnp.where(same[:, None, None], all_, mean)  # noqa: E731
+    chosen = lambda all_: all_.at[..., 1:].multiply(same[:, None, None])  # noqa: E731
     kinds = lambda m: (m.c_H, m.J, m.H_gimbal)  # noqa: E731
-    shaking = eqx.tree_at(kinds, averaged, tuple(map(chosen, kinds(moments), kinds(averaged))))
+    shaking = eqx.tree_at(kinds, moments, tuple(map(chosen, kinds(moments))))
     xi = jnp.where(same[:, None, None], xi, 0.0)
     s = 1j * speed[:, None] * jnp.array(ORDERS)
     spin = jax.vmap(jax.vmap(lambda s: s * jnp.eye(3) + small.turning))(s)
