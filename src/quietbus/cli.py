@@ -16,12 +16,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
     from rich.table import Table
 
     from quietbus.scenario import Scenario
@@ -366,17 +367,26 @@ def analyze(
 
 
 def _print_analysis(study: Study, output: Path) -> None:
-    from quietbus.plots import analysis_figures, save_figures
+    from quietbus.plots import analysis_figures
     from quietbus.tables import analysis_tables
 
     for part in analysis_tables(study):
         print(part) if isinstance(part, str) else _print(part)
+    _write_study("analysis", study.to_dict(), lambda: analysis_figures(study), output)
+
+
+def _write_study(
+    name: str, numbers: Mapping[str, Any], draw: Callable[[], dict[str, Figure]], output: Path
+) -> None:
+    """NAME.json and the pictures of a study into a folder."""
+    from quietbus.plots import save_figures
+
     with _status() as tell:
         tell("drawing")
-        figures = analysis_figures(study)
+        figures = draw()
         save_figures(figures, output)
-    (output / "analysis.json").write_text(json.dumps(study.to_dict(), indent=2) + "\n")
-    print(f"wrote analysis.json and {len(figures)} pictures to {output}/")
+    (output / f"{name}.json").write_text(json.dumps(numbers, indent=2) + "\n")
+    print(f"wrote {name}.json and {len(figures)} pictures to {output}/")
 
 
 @app.command()
@@ -405,17 +415,12 @@ def jitter(
     if as_json:
         print(json.dumps(numbers, indent=2, allow_nan=False))
         return
-    from quietbus.plots import jitter_figures, save_figures
+    from quietbus.plots import jitter_figures
     from quietbus.tables import jitter_tables
 
     for table in jitter_tables(numbers):
         _print(table)
-    with _status() as tell:
-        tell("drawing")
-        figures = jitter_figures(study)
-        save_figures(figures, output)
-    (output / "jitter.json").write_text(json.dumps(numbers, indent=2) + "\n")
-    print(f"wrote jitter.json and {len(figures)} pictures to {output}/")
+    _write_study("jitter", numbers, lambda: jitter_figures(study), output)
 
 
 @app.command()

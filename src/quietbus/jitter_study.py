@@ -143,8 +143,7 @@ class JitterStudy:
                 ``"isolator.legs.stiffness"``, ``"cluster.rotor.speed"``.
 
         Raises:
-            ScenarioError: a path that the scenario does not have.
-            ValueError: what lies there is not one number.
+            ScenarioError: the scenario has no such path, or what lies there is not one number.
         """
         satellite = self.satellite(mount)
         ways = [self._way(path, mount) for path in paths]
