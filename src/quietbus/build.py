@@ -21,6 +21,7 @@ from quietbus.model.controller import GimbalServo, PIDController
 from quietbus.model.guidance import EigenaxisSlew, Guidance, StepGuidance
 from quietbus.model.hexapod import Hexapod, LegParts
 from quietbus.model.load import Constant, HalfSine, Load, Profile, Step, Table
+from quietbus.model.rotor import RotorDrive, RunUp, WheelMotors
 from quietbus.model.satellite import Satellite
 from quietbus.model.steering import (
     GeneralizedSingularityRobust,
@@ -31,6 +32,7 @@ from quietbus.model.steering import (
 from quietbus.scenario import Scenario
 from quietbus.scenario import control as scenario_control
 from quietbus.scenario import hardware as scenario_hardware
+from quietbus.scenario.wheels import Wheel, WheelCluster
 
 
 def build_satellite(
@@ -48,6 +50,7 @@ def build_satellite(
     base = _rotation(isolator.orientation)
     phases = cluster.rotor_phases or (0.0,) * cluster.count
     units = [_unit(unit, phase) for unit, phase in zip(cluster.placed(), phases, strict=True)]
+    stacked = jax.tree.map(lambda *each: _array(np.stack(each)), *units)
     satellite = Satellite(
         bus=Bus(_array(scenario.bus.mass), _array(scenario.bus.inertia)),
         plate=Plate(
@@ -56,14 +59,10 @@ def build_satellite(
             _array(isolator.plate.inertia),
         ),
         legs=_legs(isolator),
-        cluster=jax.tree.map(lambda *each: _array(np.stack(each)), *units),
+        cluster=dataclasses.replace(stacked, drive=_drive(cluster)),
         p_BP_B=_array(isolator.offset + base.apply([0.0, 0.0, isolator.separation])),
         q_BP=_array(_quaternion(base)),
-        servo=GimbalServo(
-            _array(cluster.gimbal_bandwidth),
-            _optional(cluster.gimbal_rate_limit),
-            _optional(cluster.gimbal_acceleration_limit),
-        ),
+        servo=_servo(cluster),
         guidance=_guidance(scenario),
         controller=None,
         steering=_steering(scenario.control),
@@ -133,12 +132,47 @@ def _legs(isolator: scenario_hardware.Isolator) -> Hexapod:
     )
 
 
-def _gimbal_angles(cluster: scenario_hardware.Cluster) -> np.ndarray:
+def _servo(cluster: scenario_hardware.Cluster | WheelCluster) -> GimbalServo:
+    if isinstance(cluster, WheelCluster):
+        return GimbalServo(_array(0.0), None, None)  # held
+    return GimbalServo(
+        _array(cluster.gimbal_bandwidth),
+        _optional(cluster.gimbal_rate_limit),
+        _optional(cluster.gimbal_acceleration_limit),
+    )
+
+
+def _drive(cluster: scenario_hardware.Cluster | WheelCluster) -> RotorDrive | None:
+    """What changes the rotors' speeds; None if nothing does."""
+    units, run_up = cluster.placed(), None
+    if cluster.run_up is not None:
+        said, one = cluster.run_up, np.ones(len(units))
+        speeds = said.speeds(tuple(unit.rotor.speed for unit in units))  # type: ignore[union-attr]
+        times = (_array(said.start * one), _array(said.duration * one))
+        run_up = RunUp(*(_array(speed) for speed in speeds), *times, said.shape)
+    if not isinstance(cluster, WheelCluster):
+        return run_up
+    motors = [wheel.motor or cluster.motor for wheel in cluster.placed()]
+    return WheelMotors(
+        _limits([motor.torque_limit for motor in motors]),
+        _limits([motor.speed_limit for motor in motors]),
+        run_up,
+    )
+
+
+def _limits(values: list[float | None]) -> jax.Array | None:
+    """One limit for each unit; None if no unit has one."""
+    if all(value is None for value in values):
+        return None
+    return _array([np.inf if value is None else value for value in values])
+
+
+def _gimbal_angles(cluster: scenario_hardware.Cluster | WheelCluster) -> np.ndarray:
     return np.array(cluster.gimbal_angles or np.zeros(cluster.count))
 
 
-def _unit(unit: scenario_hardware.Unit, phase: float) -> ControlMomentGyro:
-    """One CMG."""
+def _unit(unit: scenario_hardware.Unit | Wheel, phase: float) -> ControlMomentGyro:
+    """One CMG, or a wheel with its housing as a gimbal body that is held."""
     body, rotor = unit.gimbal_body, unit.rotor
     assert body is not None  # Cluster.placed fills both in
     assert rotor is not None

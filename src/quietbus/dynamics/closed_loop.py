@@ -9,6 +9,7 @@ from quietbus.dynamics.equations import Accelerations, Wrench, accelerations, pl
 from quietbus.dynamics.kinematics import PlateMotion
 from quietbus.dynamics.state import State
 from quietbus.model.cmg import ClusterMoments, ControlMomentGyro
+from quietbus.model.rotor import RotorState, WheelMotors
 from quietbus.model.satellite import Satellite
 from quietbus.model.steering import singularity_measure
 from quietbus.spatial.rotation import (
@@ -30,33 +31,55 @@ class ControlSignals(eqx.Module):
     gimbal_rate_command: Float[Array, " cmg"]  # [rad/s] within the rate limit
     gimbal_acceleration: Float[Array, " cmg"]  # [rad/s^2]
     singularity: Float[Array, ""]  # [-]
+    # where rotor speeds change:
+    rotor_acceleration: Float[Array, " cmg"] | None = None  # [rad/s^2]
+    torque_share: Float[Array, ""] | None = None  # [-] left by the wheels' torque limits
 
 
-def rotor_angles(satellite: Satellite, t: Float[Array, ""]) -> Float[Array, " cmg"]:
+def rotor_angles(satellite: Satellite, t: Float[Array, ""], state: State) -> Float[Array, " cmg"]:
     """Rotor angles [rad] at time t [s]."""
+    if state.rotor is not None:
+        return state.rotor.angle
     return satellite.cluster.rotor_phase + satellite.cluster.rotor_speed * t
 
 
 def torque_axes(
-    satellite: Satellite, gimbal_angle: Float[Array, " cmg"]
+    satellite: Satellite,
+    gimbal_angle: Float[Array, " cmg"],
+    rotor_speed: Float[Array, " cmg"] | None = None,
 ) -> tuple[Float[Array, "3 cmg"], Float[Array, ""]]:
-    """Momentum derivatives dh/dgamma over the units' RMS momentum, plate axes, and that momentum.
+    """What the units' motion does to the momentum: axes in the plate, and their scale.
 
-    The RMS momentum [N m s] counts as 1 where no rotor turns.
+    CMGs: momentum derivatives dh/dgamma over the units' RMS momentum, and that momentum [N m s],
+    which counts as 1 where no rotor turns. Wheels: spin axes times the motors' weights, and 1.
+
+    Args:
+        rotor_speed: (cmg,) [rad/s], instead of the nominal one.
     """
     cluster = satellite.cluster
-    h_rms = jnp.sqrt(jnp.mean(cluster.momentum**2))
+    R_PG = eqx.filter_vmap(ControlMomentGyro.R_PG)(cluster, gimbal_angle)
+    if isinstance(cluster.drive, WheelMotors):
+        return R_PG[:, :, 0].T * cluster.drive.weights, jnp.ones(())
+    momentum = cluster.momentum
+    if rotor_speed is not None:
+        momentum = cluster.I_RRcm_R[:, 0, 0] * rotor_speed
+    h_rms = jnp.sqrt(jnp.mean(momentum**2))
     h_rms = jnp.where(h_rms > 0.0, h_rms, 1.0)
-    t_P = eqx.filter_vmap(ControlMomentGyro.R_PG)(cluster, gimbal_angle)[:, :, 1]
-    return (cluster.momentum[:, None] * t_P).T / h_rms, h_rms
+    return (momentum[:, None] * R_PG[:, :, 1]).T / h_rms, h_rms
 
 
 def control_signals(satellite: Satellite, t: Float[Array, ""], state: State) -> ControlSignals:
     """Controller, steering and gimbal servo at time t [s]."""
     reference = satellite.guidance.reference(t)
     error = attitude_error(reference.q_NR, state.q_NB)
-    A, h_rms = torque_axes(satellite, state.gimbal_angle)
+    rotor, drive = state.rotor, satellite.cluster.drive
+    A, h_rms = torque_axes(satellite, state.gimbal_angle, rotor and rotor.speed)
 
+    rotor_acceleration = torque_share = None
+    if rotor is not None:
+        rotor_acceleration = jnp.zeros_like(rotor.speed)
+        if satellite.cluster.run_up is not None:
+            rotor_acceleration = satellite.cluster.run_up.acceleration(t)
     rate_command = jnp.zeros_like(state.gimbal_rate)
     torque = integral_rate = jnp.zeros(3)
     controller = satellite.controller
@@ -68,14 +91,22 @@ def control_signals(satellite: Satellite, t: Float[Array, ""], state: State) -> 
             error, state.error_integral, rate_error, R_BR @ reference.dw_NR_R
         )
         torque = controller.limited(asked)
-        share = jnp.ones(())
+        delivered = torque
         if satellite.steering is not None:
             # the reaction of dh/dt on the plate is the torque, in the nominal pose of the plate
-            momentum_rate = -quaternion_to_matrix(satellite.q_BP).T @ torque
-            rate_command = satellite.steering.rates(A, momentum_rate / h_rms, t)
-            share = satellite.servo.share(rate_command)
-            rate_command = share * rate_command
-        integral_rate = controller.integral_rate(error, asked, share * torque)
+            R_BP = quaternion_to_matrix(satellite.q_BP)
+            command = satellite.steering.rates(A, -R_BP.T @ torque / h_rms, t)
+            if isinstance(drive, WheelMotors):
+                assert rotor is not None
+                wheel_torque = drive.weights * command
+                torque_share = drive.share(wheel_torque)
+                wheel_torque = drive.within_speed(torque_share * wheel_torque, rotor.speed)
+                delivered = -R_BP @ A @ (wheel_torque / drive.weights)
+                rotor_acceleration = wheel_torque / satellite.cluster.I_RRcm_R[:, 0, 0]
+            else:
+                share = satellite.servo.share(command)
+                rate_command, delivered = share * command, share * torque
+        integral_rate = controller.integral_rate(error, asked, delivered)
     return ControlSignals(
         error,
         torque,
@@ -83,6 +114,8 @@ def control_signals(satellite: Satellite, t: Float[Array, ""], state: State) -> 
         rate_command,
         satellite.servo.acceleration(rate_command, state.gimbal_rate),
         singularity_measure(A),
+        rotor_acceleration,
+        torque_share,
     )
 
 
@@ -106,11 +139,17 @@ def evaluate(
     moments: ClusterMoments | None = None,
 ) -> tuple[ControlSignals, Accelerations]:
     """Control decisions and accelerations at time t [s]; rotor angles as given or those of t."""
-    phi = rotor_angles(satellite, t) if rotor_angle is None else rotor_angle
+    phi = rotor_angles(satellite, t, state) if rotor_angle is None else rotor_angle
     signals = control_signals(satellite, t, state)
     wrench = external_wrench(satellite, t, plate_motion(state))
     return signals, accelerations(
-        satellite, state, phi, signals.gimbal_acceleration, wrench, moments
+        satellite,
+        state,
+        phi,
+        signals.gimbal_acceleration,
+        wrench,
+        moments,
+        signals.rotor_acceleration,
     )
 
 
@@ -124,6 +163,10 @@ def state_rate(
     """Time derivative of the state (arguments as of ``evaluate`` and ``accelerations``)."""
     signals, acceleration = evaluate(satellite, t, state, rotor_angle, moments)
     R_NB, R_NP = quaternion_to_matrix(state.q_NB), quaternion_to_matrix(state.q_NP)
+    rotor = None
+    if state.rotor is not None:
+        assert signals.rotor_acceleration is not None
+        rotor = RotorState(angle=state.rotor.speed, speed=signals.rotor_acceleration)
     return State(
         p_NB_N=state.v_NB_N,
         q_NB=quaternion_rate(state.q_NB, state.w_NB_B),
@@ -136,6 +179,7 @@ def state_rate(
         gimbal_angle=state.gimbal_rate,
         gimbal_rate=signals.gimbal_acceleration,
         error_integral=signals.integral_rate,
+        rotor=rotor,
     )
 
 
@@ -147,8 +191,14 @@ def initial_state(
 ) -> State:
     """Plate and bus moving as one, the plate in its nominal pose, bus mass centre at rest at 0."""
     zero, none = jnp.zeros(3), jnp.zeros(4)
+    cluster, rotor = satellite.cluster, None
+    if cluster.drive is not None:
+        run_up = cluster.run_up
+        speed = cluster.rotor_speed if run_up is None else run_up.initial_speed
+        rotor = RotorState(cluster.rotor_phase, speed)
+    still = 0.0 * gimbal_angle
     state = State(
-        zero, q_NB, zero, none, zero, w_NB_B, zero, zero, gimbal_angle, 0.0 * gimbal_angle, zero
+        zero, q_NB, zero, none, zero, w_NB_B, zero, zero, gimbal_angle, still, zero, rotor
     )
     return with_plate_on_bus(satellite, state)
 

@@ -69,6 +69,7 @@ def accelerations(
     gimbal_acceleration: Float[Array, " cmg"],
     wrench: Wrench,
     moments: ClusterMoments | None = None,
+    rotor_acceleration: Float[Array, " cmg"] | None = None,
 ) -> Accelerations:
     """Accelerations of plate and bus.
 
@@ -77,9 +78,14 @@ def accelerations(
         gimbal_acceleration: (cmg,) prescribed by the gimbal servos [rad/s^2].
         wrench: external loads.
         moments: ``ClusterMoments.expand(satellite.cluster)``, for callers who evaluate often.
+        rotor_acceleration: (cmg,) prescribed by the rotors' motors [rad/s^2]; needed where the
+            state holds the rotors' speeds.
     """
     if moments is None:
         moments = ClusterMoments.expand(satellite.cluster)
+    if state.rotor is not None:
+        assert rotor_acceleration is not None
+        moments = moments.turning(state.rotor.speed, rotor_acceleration)
     plates = plate_motion(state)
     carried = moments.at(state.gimbal_angle, rotor_angle, state.gimbal_rate, gimbal_acceleration)
     M = mass_matrix(satellite, plates, carried)

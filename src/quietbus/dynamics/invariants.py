@@ -91,11 +91,12 @@ def body_motions(satellite: Satellite, rotor_angle: Float[Array, " cmg"], state:
         jnp.stack([w_B, w_P]),
     )
 
-    def unit(cmg, gamma, gamma_rate, phi):
-        return _cmg_motions(cmg, gamma, gamma_rate, phi, state, R_NP, w_P)
+    def unit(cmg, gamma, gamma_rate, phi, rotor_speed):
+        return _cmg_motions(cmg, gamma, gamma_rate, phi, rotor_speed, state, R_NP, w_P)
 
+    speed = satellite.cluster.rotor_speed if state.rotor is None else state.rotor.speed
     gimbals, rotors = jax.vmap(unit)(
-        satellite.cluster, state.gimbal_angle, state.gimbal_rate, rotor_angle
+        satellite.cluster, state.gimbal_angle, state.gimbal_rate, rotor_angle, speed
     )
     groups = (two, gimbals, rotors, *_leg_motions(satellite, state))
     return jax.tree.map(lambda *parts: jnp.concatenate(parts), *groups)
@@ -110,12 +111,12 @@ def joint_motion(satellite: Satellite, state: State) -> Joints:
 
 
 def _cmg_motions(
-    cmg: ControlMomentGyro, gamma, gamma_rate, phi, state: State, R_NP, w_P
+    cmg: ControlMomentGyro, gamma, gamma_rate, phi, rotor_speed, state: State, R_NP, w_P
 ) -> tuple[Motion, Motion]:
     R_NG = R_NP @ cmg.R_PG(gamma)
     w_G = w_P + gamma_rate * R_NG[:, 2]
     R_NR = R_NG @ cmg.R_GR(phi)
-    w_R = w_G + cmg.rotor_speed * R_NR[:, 0]
+    w_R = w_G + rotor_speed * R_NR[:, 0]
     r_C = R_NP @ cmg.p_PC_P
     p_C, v_C = state.p_NP_N + r_C, state.v_NP_N + jnp.cross(w_P, r_C)
     r_G, r_R = R_NG @ cmg.p_CGcm_G, R_NG @ cmg.p_CR_G

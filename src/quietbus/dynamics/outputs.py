@@ -8,8 +8,11 @@ from quietbus.dynamics.closed_loop import control_signals, evaluate
 from quietbus.dynamics.equations import plate_motion
 from quietbus.dynamics.joint_forces import JointForces, joint_forces
 from quietbus.dynamics.kinematics import leg_motion
+from quietbus.dynamics.rotor_torques import rotor_torques
 from quietbus.dynamics.state import State
+from quietbus.model.cmg import ClusterMoments
 from quietbus.model.satellite import Satellite
+from quietbus.model.variants import balanced
 
 
 class Outputs(eqx.Module):
@@ -31,18 +34,36 @@ class Outputs(eqx.Module):
     attitude_error: Float[Array, "3"]
     singularity_measure: Float[Array, ""]
     joint_forces: JointForces | None
+    # where rotor speeds change:
+    rotor_angle: Float[Array, " cmg"] | None = None
+    rotor_speed: Float[Array, " cmg"] | None = None
+    rotor_torque: Float[Array, " cmg"] | None = None
+    torque_share: Float[Array, ""] | None = None  # of wheels under control
 
 
 def outputs(
-    satellite: Satellite, t: Float[Array, ""], state: State, with_joint_forces: bool = False
+    satellite: Satellite,
+    t: Float[Array, ""],
+    state: State,
+    with_joint_forces: bool = False,
+    averaged: ClusterMoments | None = None,
 ) -> Outputs:
-    """Outputs at time t [s]; joint forces need the accelerations and so cost more."""
+    """Outputs at time t [s]; joint forces and rotors' torques need the accelerations: they cost.
+
+    Args:
+        averaged: as of ``ClusterMoments.averaged``, if the state is the slow motion's.
+    """
     signals = control_signals(satellite, t, state)
     motion = leg_motion(satellite.legs, plate_motion(state))
-    joints = None
-    if with_joint_forces:
-        _, acceleration = evaluate(satellite, t, state)
-        joints = joint_forces(satellite, state, acceleration)
+    joints, rotors = None, (None, None, None)
+    if with_joint_forces or state.rotor is not None:
+        _, acceleration = evaluate(satellite, t, state, None, averaged)
+        if with_joint_forces:
+            joints = joint_forces(satellite, state, acceleration)
+        if state.rotor is not None:
+            shaken = satellite if averaged is None else balanced(satellite)
+            torque = rotor_torques(shaken, state, signals, acceleration)
+            rotors = state.rotor.angle, state.rotor.speed, torque
     return Outputs(
         bus_position=state.p_NB_N,
         bus_velocity=state.v_NB_N,
@@ -60,6 +81,10 @@ def outputs(
         attitude_error=signals.attitude_error_B,
         singularity_measure=signals.singularity,
         joint_forces=joints,
+        rotor_angle=rotors[0],
+        rotor_speed=rotors[1],
+        rotor_torque=rotors[2],
+        torque_share=signals.torque_share,
     )
 
 

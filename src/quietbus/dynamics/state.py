@@ -3,12 +3,14 @@
 import equinox as eqx
 from jaxtyping import Array, Float
 
+from quietbus.model.rotor import RotorState
+
 
 class State(eqx.Module):
     """Motion of bus, plate and gimbals, and the controller's memory.
 
-    The legs add no freedom of their own: their two ends fix them. Rotor angles are a function of
-    time, since the rotors turn at constant speed.
+    The legs add no freedom of their own: their two ends fix them. Angles of rotors that turn at
+    constant speed are a function of time.
     """
 
     p_NB_N: Float[Array, "3"]  # [m] bus mass centre
@@ -22,3 +24,4 @@ class State(eqx.Module):
     gimbal_angle: Float[Array, " cmg"]  # [rad]
     gimbal_rate: Float[Array, " cmg"]  # [rad/s]
     error_integral: Float[Array, "3"]  # [rad s] integral of the attitude error, bus frame
+    rotor: RotorState | None = None  # None: the rotors turn at constant speed

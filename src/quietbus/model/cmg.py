@@ -1,5 +1,7 @@
 """Single-gimbal CMGs: gimbal body and unbalanced rotor, on the upper plate.
 
+A reaction wheel is a unit whose gimbal is held: its gimbal body is the housing.
+
 Axes of a unit's gimbal frame G: s (spin), t = g x s, g (gimbal axis). Gimbal angle gamma turns s
 towards t; rotor angle phi turns t towards g about the spin axis. All imbalance lives in the
 rotor's rigid-body properties, so its disturbance needs no force added by hand.
@@ -11,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from quietbus.model.rotor import RotorDrive, RunUp, WheelMotors
 from quietbus.spatial.inertia import point_inertia
 
 
@@ -25,7 +28,7 @@ class Carried(eqx.Module):
 
 
 class ControlMomentGyro(eqx.Module):
-    """One single-gimbal CMG with its rotor at constant speed.
+    """One single-gimbal CMG; its rotor turns at constant speed unless ``drive`` changes it.
 
     A cluster is the same module with a leading axis on every field.
     """
@@ -40,8 +43,14 @@ class ControlMomentGyro(eqx.Module):
     R_GF: Float[Array, "3 3"]  # [-] installation error: bearing frame F of the rotor in G
     I_RRcm_R: Float[Array, "3 3"]  # [kg m^2] rotor about its mass centre, rotor axes
     eccentricity: Float[Array, ""]  # [m] of the rotor's mass centre, along rotor axis y
-    rotor_speed: Float[Array, ""]  # [rad/s]
+    rotor_speed: Float[Array, ""]  # [rad/s] nominal; of a wheel that at t = 0
     rotor_phase: Float[Array, ""]  # [rad] rotor angle at t = 0
+    drive: RotorDrive | None = None  # None: constant speed
+
+    @property
+    def run_up(self) -> RunUp | None:
+        """The prescribed change of speed, if there is one."""
+        return self.drive.run_up if isinstance(self.drive, WheelMotors) else self.drive
 
     @property
     def momentum(self) -> Float[Array, ""]:
@@ -125,6 +134,9 @@ class ClusterMoments(eqx.Module):
     c_H: Float[Array, "6 cmg 3 3"]  # c and H of the spin, by gimbal and rotor basis of degree 1
     J: Float[Array, "6 cmg 5 5"]  # xx, yy, zz, xy, xz, yz
     H_gimbal: Float[Array, "3 cmg 3 5"]  # [kg m^2] H per gimbal rate
+    # where speeds change:
+    H_speed: Float[Array, "3 cmg 3 3"] | None = None  # [kg m^2] H of the spin per rotor speed
+    rotor_acceleration: Float[Array, " cmg"] | None = None  # [rad/s^2]
 
     @classmethod
     def expand(cls, cluster: ControlMomentGyro) -> "ClusterMoments":
@@ -141,8 +153,25 @@ class ClusterMoments(eqx.Module):
             return fit(jnp.concatenate([c, H], axis=2))[:3, :3], fit(J), fit(H_gimbal)[:3]
 
         mass = jnp.sum(cluster.gimbal_mass + cluster.rotor_mass)
-        moments = (jnp.moveaxis(m, -1, 0) for m in eqx.filter_vmap(unit)(cluster))
-        return cls(mass, cluster.rotor_speed, *moments)
+        moments = [jnp.moveaxis(m, -1, 0) for m in eqx.filter_vmap(unit)(cluster)]
+        H_speed = None
+        if cluster.drive is not None:
+            at_one = eqx.tree_at(lambda c: c.rotor_speed, cluster, jnp.ones_like(cluster.rotor_speed))
+            H_speed = jnp.moveaxis(eqx.filter_vmap(unit)(at_one)[0], -1, 0)[3:]
+        return cls(mass, cluster.rotor_speed, *moments, H_speed)
+
+    def turning(
+        self, speed: Float[Array, " cmg"], acceleration: Float[Array, " cmg"]
+    ) -> "ClusterMoments":
+        """The moments with the rotors at other speeds [rad/s], which change [rad/s^2].
+
+        Only of a cluster whose speeds change.
+        """
+        assert self.H_speed is not None
+        c_H = jnp.concatenate([self.c_H[:3], speed[:, None, None] * self.H_speed])
+        changed = (speed, c_H, acceleration)
+        where = lambda m: (m.rotor_speed, m.c_H, m.rotor_acceleration)  # noqa: E731
+        return eqx.tree_at(where, self, changed, is_leaf=lambda leaf: leaf is None)
 
     def averaged(self) -> "ClusterMoments":
         """The moments averaged over the rotor angles: the imbalance's rotating part is gone.
@@ -156,6 +185,8 @@ class ClusterMoments(eqx.Module):
             constant(self.c_H),
             constant(self.J),
             constant(self.H_gimbal),
+            None if self.H_speed is None else constant(self.H_speed),
+            self.rotor_acceleration,
         )
 
     def at(
@@ -178,6 +209,12 @@ class ClusterMoments(eqx.Module):
             + speed**2 * g[0] * f[2]
             + acceleration * g[1] * f[0]
         )
+        spin_up = 0.0
+        if self.rotor_acceleration is not None:
+            assert self.H_speed is not None
+            rotor_acceleration = self.rotor_acceleration[:, None, None]
+            b2 = b2 + rotor_acceleration * g[0] * f[1]
+            spin_up = _contract((rotor_acceleration * b)[:, :3, :3], self.H_speed)
         c, b1_, p_rate = (_contract(row[:, :3, :3], self.c_H) for row in (b, b1, b2))
         J, J_rate = (_contract(row, self.J)[_SYMMETRIC] for row in (b, b1))
         H_gimbal = _contract(rate * b[:, :3], self.H_gimbal)
@@ -190,7 +227,7 @@ class ClusterMoments(eqx.Module):
             H=c[3:] + H_gimbal,
             J_rate=J_rate,
             p_rate=p_rate[:3],
-            H_rate=b1_[3:] + H_gimbal_rate,
+            H_rate=b1_[3:] + H_gimbal_rate + spin_up,
         )
 
     def order(
@@ -212,6 +249,12 @@ class ClusterMoments(eqx.Module):
         b1 = spin * one + rate * first
         b2 = spin**2 * one + 2.0 * spin * rate * first + rate**2 * second + acceleration * first
         times = lambda row, k: jnp.einsum("jg,mjg->jm", row[:, : k.shape[2]], k)  # noqa: E731
+        spin_up = 0.0
+        if self.rotor_acceleration is not None:
+            assert self.H_speed is not None
+            rotor_acceleration = self.rotor_acceleration[:, None]
+            b2 = b2 + 1j * h * rotor_acceleration * one if h else b2
+            spin_up = times(rotor_acceleration * one, _amplitude(self.H_speed, h))
         c_H, J, H_gimbal = (_amplitude(k, h) for k in (self.c_H, self.J, self.H_gimbal))
         at, at_rate, at_second = (times(row, c_H) for row in (one, b1, b2))
         return CarriedMotion(
@@ -222,7 +265,9 @@ class ClusterMoments(eqx.Module):
             H=at[:, 3:] + times(rate * one, H_gimbal),
             J_rate=times(b1, J)[:, _SYMMETRIC],
             p_rate=at_second[:, :3],
-            H_rate=at_rate[:, 3:] + times(rate * b1 + acceleration * one, H_gimbal),
+            H_rate=at_rate[:, 3:]
+            + times(rate * b1 + acceleration * one, H_gimbal)
+            + spin_up,
         )
 
 

@@ -1,6 +1,7 @@
 """A satellite with something taken out of it, for checks and for "what if"."""
 
 import equinox as eqx
+import jax.numpy as jnp
 
 from quietbus.model.satellite import Satellite
 
@@ -25,3 +26,13 @@ def without_rotation(satellite: Satellite) -> Satellite:
     """The satellite with its rotors at a standstill."""
     speed = lambda s: s.cluster.rotor_speed  # noqa: E731
     return eqx.tree_at(speed, satellite, 0.0 * speed(satellite))
+
+
+def balanced(satellite: Satellite) -> Satellite:
+    """The satellite with balanced rotors, whose transverse inertia is its mean over a turn."""
+    cluster = satellite.cluster
+    I = cluster.I_RRcm_R
+    across = 0.5 * (I[:, 1, 1] + I[:, 2, 2])
+    round_ = jnp.stack([I[:, 0, 0], across, across], axis=1)[:, :, None] * jnp.eye(3)
+    where = lambda s: (s.cluster.eccentricity, s.cluster.I_RRcm_R)  # noqa: E731
+    return eqx.tree_at(where, satellite, (0.0 * cluster.eccentricity, round_))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
@@ -39,6 +39,7 @@ from quietbus.scenario.base import (
 )
 from quietbus.scenario.checks import free_directions, inertia_defect, listed
 from quietbus.scenario.errors import Findings
+from quietbus.scenario.run_up import RunUp
 
 
 class Bus(Part):
@@ -193,7 +194,7 @@ class InstallationError(Part):
 
 
 class Rotor(Part):
-    """A rotor at constant speed; exactly one of `momentum` and `spin_inertia` is given."""
+    """A rotor; exactly one of `momentum`, at its speed, and `spin_inertia` is given."""
 
     mass: PositiveMass
     momentum: Momentum | None = None
@@ -252,7 +253,10 @@ class Rotor(Part):
 
 
 class Pyramid(Part):
-    """Units around the plate's z axis, gimbal axes leaning outwards from it by `skew`."""
+    """Units around the plate's z axis, gimbal axes leaning outwards from it by `skew`.
+
+    Of reaction wheels the spin axes.
+    """
 
     skew: Angle
     radius: Distance
@@ -263,6 +267,7 @@ class Pyramid(Part):
 class Unit(Part):
     """One CMG placed at will, upper-plate frame."""
 
+    type: Literal["cmg"] | None = None  # None: the cluster's
     position: Vector[Length]
     gimbal_axis: UnitVector
     spin_axis: UnitVector  # at zero gimbal angle
@@ -291,66 +296,62 @@ class Unit(Part):
         return self
 
 
-class Cluster(Part):
-    """The CMGs: a pyramid, or a list of units with what differs from the common parts."""
+class Placed(Part):
+    """What clusters of CMGs and of reaction wheels have in common.
+
+    A pyramid, or a list of units with what differs from the common parts.
+    """
+
+    COMMON: ClassVar[tuple[str, ...]]  # parts that a unit may override
+    PER_UNIT: ClassVar[dict[str, str]] = {"rotor_phases": "angles"}
+    NOUN: ClassVar[str]
 
     pyramid: Pyramid | None = None
-    units: Annotated[tuple[Unit, ...], listing(None, "units")] | None = None
-    gimbal_body: GimbalBody
     rotor: Rotor
     rotor_phases: Series[Angle] | None = None  # rotor angles at the start; None: zeros
-    gimbal_angles: Series[Angle] | None = None
-    gimbal_bandwidth: PositiveAngularVelocity  # of the first-order rate servo
-    gimbal_rate_limit: PositiveAngularVelocity | None = None
-    gimbal_acceleration_limit: PositiveAngularAcceleration | None = None
+    run_up: RunUp | None = None  # None: speeds as the rotors have them
 
     @property
     def count(self) -> int:
-        """Number of CMGs."""
-        if self.pyramid is not None:
-            return self.pyramid.units
-        return len(self.units or ())
+        """Number of units."""
+        return self.pyramid.units if self.pyramid else len(getattr(self, "units", None) or ())
 
-    def placed(self) -> tuple[Unit, ...]:
-        """All CMGs as units, each with its gimbal body and rotor.
+    def azimuths(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Of each unit of the pyramid: radial direction, position, axis that leans outwards.
 
-        Unit j of a pyramid of n stands at the azimuth 2 pi j / n.
+        Unit j of n stands at the azimuth 2 pi j / n.
         """
-        bodies = {"gimbal_body": self.gimbal_body, "rotor": self.rotor}
-        if self.pyramid is None:
-            return tuple(
-                unit.model_copy(update={key: getattr(unit, key) or bodies[key] for key in bodies})
-                for unit in self.units or ()
-            )
-        z, units = np.array([0.0, 0.0, 1.0]), []
+        assert self.pyramid is not None
+        z, found = np.array([0.0, 0.0, 1.0]), []
         for azimuth in 2.0 * np.pi * np.arange(self.count) / self.count:
             r = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
-            units.append(
-                Unit(
-                    position=self.pyramid.radius * r + self.pyramid.height * z,
-                    gimbal_axis=np.sin(self.pyramid.skew) * r + np.cos(self.pyramid.skew) * z,
-                    spin_axis=np.cross(z, r),
-                    gimbal_body=self.gimbal_body,
-                    rotor=self.rotor,
-                )
-            )
-        return tuple(units)
+            position = self.pyramid.radius * r + self.pyramid.height * z
+            found.append((r, position, np.sin(self.pyramid.skew) * r + np.cos(self.pyramid.skew) * z))
+        return found
+
+    def completed(self) -> tuple[Any, ...]:
+        """The listed units, each with all its parts."""
+        common = {key: getattr(self, key) for key in self.COMMON}
+        return tuple(
+            unit.model_copy(update={key: getattr(unit, key) or common[key] for key in common})
+            for unit in getattr(self, "units", None) or ()
+        )
 
     @model_validator(mode="before")
     @classmethod
     def _complete_units(cls, data: Any) -> Any:
-        """Merge what a unit says about its rotor and gimbal body onto the common ones."""
+        """Merge what a unit says about its parts onto the common ones."""
         if not (isinstance(data, dict) and isinstance(data.get("units"), list | tuple)):
             return data
-        return data | {"units": [_completed(unit, data) for unit in data["units"]]}
+        return data | {"units": [_completed(unit, data, cls.COMMON) for unit in data["units"]]}
 
     @model_serializer(mode="wrap")
     def _shorten_units(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Leave out what a unit has in common, so that an override of that reaches the unit."""
         data: dict[str, Any] = handler(self)
         for unit in data["units"] or ():
-            for key in ("gimbal_body", "rotor"):
-                if unit[key] is not None:
+            for key in self.COMMON:
+                if unit[key] is not None and data[key] is not None:
                     common = data[key]
                     unit[key] = {k: v for k, v in unit[key].items() if v != common[k]}
         return data
@@ -358,26 +359,63 @@ class Cluster(Part):
     @model_validator(mode="after")
     def _check(self) -> Self:
         findings = Findings()
-        if (self.pyramid is None) == (self.units is None):
-            got = "neither" if self.units is None else "both"
+        units = getattr(self, "units", None)
+        if (self.pyramid is None) == (units is None):
+            got = "neither" if units is None else "both"
             findings.add((), f"expected exactly one of pyramid and units, got {got}")
         findings.raise_any()
-        for key in ("rotor_phases", "gimbal_angles"):
-            values = getattr(self, key)
-            if values is not None and len(values) != self.count:
+        lists: dict[tuple[str, ...], tuple[Any, str]] = {
+            (key,): (getattr(self, key), what) for key, what in self.PER_UNIT.items()
+        }
+        for key in ("initial_speed", "final_speed"):
+            lists["run_up", key] = (self.run_up and getattr(self.run_up, key), "speeds")
+        for path, (values, what) in lists.items():
+            if isinstance(values, tuple) and len(values) != self.count:
                 findings.add(
-                    key, f"expected {self.count} angles, one for each CMG, got {len(values)}"
+                    path, f"expected {self.count} {what}, one for each {self.NOUN}, got {len(values)}"
                 )
         findings.raise_any()
         return self
 
 
-def _completed(unit: Any, cluster: dict[str, Any]) -> Any:
+class Cluster(Placed):
+    """The CMGs."""
+
+    COMMON = ("gimbal_body", "rotor")
+    PER_UNIT: ClassVar[dict[str, str]] = {"rotor_phases": "angles", "gimbal_angles": "angles"}
+    NOUN = "CMG"
+
+    type: Literal["cmg"] = "cmg"
+    units: Annotated[tuple[Unit, ...], listing(None, "units")] | None = None
+    gimbal_body: GimbalBody
+    gimbal_angles: Series[Angle] | None = None
+    gimbal_bandwidth: PositiveAngularVelocity  # of the first-order rate servo
+    gimbal_rate_limit: PositiveAngularVelocity | None = None
+    gimbal_acceleration_limit: PositiveAngularAcceleration | None = None
+
+    def placed(self) -> tuple[Unit, ...]:
+        """All CMGs as units, each with its gimbal body and rotor."""
+        if self.pyramid is None:
+            return self.completed()
+        z = np.array([0.0, 0.0, 1.0])
+        return tuple(
+            Unit(
+                position=position,
+                gimbal_axis=axis,
+                spin_axis=np.cross(z, r),
+                gimbal_body=self.gimbal_body,
+                rotor=self.rotor,
+            )
+            for r, position, axis in self.azimuths()
+        )
+
+
+def _completed(unit: Any, cluster: dict[str, Any], keys: tuple[str, ...]) -> Any:
     """A unit's data with its partial overrides filled up from the cluster's."""
     if not isinstance(unit, dict):
         return unit
     whole = dict(unit)
-    for key in ("gimbal_body", "rotor"):
+    for key in keys:
         common, own = cluster.get(key), unit.get(key)
         if isinstance(own, dict) and isinstance(common, Part):
             common = common.model_dump(exclude_none=True)

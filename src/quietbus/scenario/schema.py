@@ -8,14 +8,17 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Self
 
+import numpy as np
 from pydantic import BeforeValidator, ValidationError, model_validator
 
 from quietbus.scenario.base import Duration, Frequency, Part, PositiveNumber, Text, listing
-from quietbus.scenario.control import Control, Initial, Load, PseudoInverse, Target
+from quietbus.scenario.control import Control, Initial, Load, NoSteering, PseudoInverse, Target
 from quietbus.scenario.errors import Findings, Path, Problem, ScenarioError, dotted, found
+from quietbus.scenario.checks import listed
 from quietbus.scenario.hardware import Bus, Cluster, Isolator
 from quietbus.scenario.text import read_yaml, write_yaml
 from quietbus.scenario.units import expected
+from quietbus.scenario.wheels import AnyCluster, WheelCluster, cluster_type
 
 MOST_SAMPLES = 2e7  # of some 400 bytes each
 
@@ -94,23 +97,36 @@ class Scenario(Part):
     name: Text
     bus: Bus
     isolator: Isolator
-    cluster: Cluster
+    cluster: AnyCluster
     control: Annotated[Control | None, BeforeValidator(_none_word)] = None
     initial: Initial = Initial()
     target: Target = Target()
     loads: Annotated[tuple[Load, ...], listing(None, "loads", least=0)] = ()
     simulation: Simulation = Simulation()
 
+    @model_validator(mode="before")
+    @classmethod
+    def _steering_of_wheels(cls, data: Any) -> Any:
+        """Wheels are steered by the pseudo-inverse unless the scenario says otherwise."""
+        if not isinstance(data, dict) or not isinstance(data.get("control"), dict):
+            return data
+        if cluster_type(data.get("cluster")) == "<wheel>":
+            return data | {"control": {"steering": {"law": "pseudo_inverse"}} | data["control"]}
+        return data
+
     @model_validator(mode="after")
     def _check_steering(self) -> Self:
         findings = Findings()
         law = self.control and self.control.steering
-        if isinstance(law, PseudoInverse) and self.cluster.count < 3:
+        if isinstance(self.cluster, WheelCluster):
+            _check_wheels(self, findings)
+        elif isinstance(law, PseudoInverse) and self.cluster.count < 3:
             findings.add(
                 ("control", "steering", "law"),
                 "expected singularity_robust or none for fewer than three CMGs, got "
                 f"pseudo_inverse, which {self.cluster.count} leave without an inverse",
             )
+        _check_run_up(self, findings)
         findings.raise_any()
         return self
 
@@ -186,3 +202,46 @@ class Scenario(Part):
                 data[key] = value
             else:
                 data = data.setdefault(key, {}) if isinstance(data, dict) else data[key]
+
+
+def _check_wheels(scenario: Scenario, findings: Findings) -> None:
+    """Steering that wheels can follow."""
+    law, path = scenario.control and scenario.control.steering, ("control", "steering", "law")
+    if law is None or isinstance(law, NoSteering):
+        return
+    axes = np.array([wheel.spin_axis for wheel in scenario.cluster.placed()])
+    strength = np.linalg.svd(axes)
+    if not isinstance(law, PseudoInverse):
+        findings.add(path, f"expected pseudo_inverse or none for reaction wheels, got {law.law}")
+    elif len(axes) < 3 or strength.S[2] < 1e-3:
+        findings.add(
+            path,
+            "expected none, or wheels whose spin axes span all directions; these "
+            f"{len(axes)} give no torque about {listed(strength.Vh[-1])} (plate frame)",
+        )
+    if scenario.cluster.run_up is not None:
+        findings.add(
+            path,
+            f"expected none while cluster.run_up prescribes the wheels' speeds, got {law.law}",
+        )
+
+
+def _check_run_up(scenario: Scenario, findings: Findings) -> None:
+    """A run-up that leaves the rest of the scenario its meaning."""
+    cluster, steering = scenario.cluster, scenario.control and scenario.control.steering
+    if cluster.run_up is None:
+        return
+    if scenario.initial.steady:
+        findings.add(
+            ("initial", "steady"),
+            "expected false with cluster.run_up: rotors that change speed have no steady jitter",
+        )
+    nominal = tuple(unit.rotor.speed for unit in cluster.placed() if unit.rotor)
+    speeds = zip(*cluster.run_up.speeds(nominal), strict=True)
+    steered = steering is not None and not isinstance(steering, NoSteering)
+    if steered and isinstance(cluster, Cluster) and any(a * b <= 0.0 for a, b in speeds):
+        findings.add(
+            ("cluster", "run_up"),
+            "expected control: none or steering: {law: none} for rotors that run up from, down to "
+            "or through rest: without momentum gimbals give no torque",
+        )

@@ -168,6 +168,8 @@ def _compiled_piece(satellite, state, numbers, scheme) -> _Piece:
         rtol=rtol, atol=atol, pcoeff=pcoeff, icoeff=icoeff, dtmin=1e-9, force_dtmin=False
     )
     corners = [load.profile.corners for load in satellite.loads]
+    if satellite.cluster.run_up is not None:
+        corners.append(satellite.cluster.run_up.corners)
     if sum(len(corner) for corner in corners):
         jumps = _apart(jnp.sort(jnp.concatenate(corners)), t0, t1)
         controller = diffrax.ClipStepSizeController(controller, jump_ts=jumps)
@@ -192,7 +194,9 @@ def _compiled_piece(satellite, state, numbers, scheme) -> _Piece:
         solution.result == diffrax.RESULTS.max_steps_reached
     )
     states = jax.vmap(lambda y: _tidy(satellite, unravel(y)))(saved)
-    reported = jax.vmap(lambda t, s: outputs(satellite, t, s, scheme.joint_forces))(ts, states)
+    reported = jax.vmap(
+        lambda t, s: outputs(satellite, t, s, scheme.joint_forces, moments if scheme.averaged else None)
+    )(ts, states)
     final = _tidy(satellite, unravel(last))
     return _Piece(
         kept=(reported, states if scheme.states else None),

@@ -1,0 +1,156 @@
+"""The scenario's reaction wheels."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import BeforeValidator, Discriminator, Tag, model_validator
+
+from quietbus.scenario.base import (
+    Length,
+    Part,
+    PositiveAngularVelocity,
+    PositiveTorque,
+    UnitVector,
+    Vector,
+    listing,
+)
+from quietbus.scenario.errors import Findings
+from quietbus.scenario.hardware import Cluster, GimbalBody, Placed, Rotor
+from quietbus.scenario.units import expected
+
+
+class Motor(Part):
+    """What a wheel's motor can do."""
+
+    torque_limit: PositiveTorque | None = None
+    speed_limit: PositiveAngularVelocity | None = None
+
+
+class Wheel(Part):
+    """One reaction wheel placed at will, upper-plate frame."""
+
+    type: Literal["wheel"] | None = None  # None: the cluster's
+    position: Vector[Length]
+    spin_axis: UnitVector
+    housing: GimbalBody | None = None  # None: the cluster's
+    rotor: Rotor | None = None
+    motor: Motor | None = None
+
+    @property
+    def gimbal_body(self) -> GimbalBody | None:
+        """The housing, which the model takes for a gimbal body that is held."""
+        return self.housing
+
+    @property
+    def gimbal_axis(self) -> tuple[float, float, float]:
+        """The wheel's axis g: plate z, or x if the wheel spins about z, made square to the spin."""
+        s = np.array(self.spin_axis)
+        for reference in np.eye(3)[[2, 0]]:
+            across = reference - (reference @ s) * s
+            if np.linalg.norm(across) > 1e-3:
+                break
+        x, y, z = (across / np.linalg.norm(across)).tolist()
+        return x, y, z
+
+
+class WheelCluster(Placed):
+    """Reaction wheels."""
+
+    COMMON = ("housing", "rotor", "motor")
+    NOUN: ClassVar[str] = "wheel"
+
+    type: Literal["wheel"] = "wheel"
+    units: Annotated[tuple[Wheel, ...], listing(None, "units")] | None = None
+    housing: GimbalBody
+    motor: Motor = Motor()
+
+    @property
+    def gimbal_angles(self) -> None:
+        """None: wheels have no gimbals."""
+        return
+
+    def placed(self) -> tuple[Wheel, ...]:
+        """All wheels as units, each with its housing, rotor and motor."""
+        if self.pyramid is None:
+            return self.completed()
+        return tuple(
+            Wheel(
+                position=position,
+                spin_axis=axis,
+                housing=self.housing,
+                rotor=self.rotor,
+                motor=self.motor,
+            )
+            for _, position, axis in self.azimuths()
+        )
+
+    @model_validator(mode="after")
+    def _check_speeds(self) -> Self:
+        """Speeds at the start, and those of a run-up, are within the motors' limits."""
+        findings = Findings()
+        wheels = self.placed()
+        nominal = tuple(wheel.rotor.speed for wheel in wheels if wheel.rotor)
+        given = {"rotor": nominal}
+        if self.run_up:
+            given = dict(zip(("initial_speed", "final_speed"), self.run_up.speeds(nominal)))
+        for key, speeds in given.items():
+            for j, (wheel, speed) in enumerate(zip(wheels, speeds, strict=True)):
+                limit = wheel.motor and wheel.motor.speed_limit
+                if limit and abs(speed) > limit:
+                    own = ("units", j) if key == "rotor" and self.units else ()
+                    path = (*own, "rotor", "speed") if key == "rotor" else ("run_up", key)
+                    findings.add(
+                        path,
+                        f"expected at most the motor's speed limit ({limit:g} rad/s), got "
+                        f"{abs(speed):g} rad/s for wheel {j}",
+                    )
+                    break
+        findings.raise_any()
+        return self
+
+
+TYPES = ("cmg", "wheel")
+
+
+def _known_type(value: Any) -> Any:
+    if not isinstance(value, dict):
+        return value
+    findings = Findings()
+    units = value.get("units")
+    of_units = [
+        (("units", j, "type"), unit["type"])
+        for j, unit in enumerate(units if isinstance(units, list | tuple) else ())
+        if isinstance(unit, dict) and "type" in unit
+    ]
+    common = [(("type",), value["type"])] if "type" in value else []
+    known: list[str] = []
+    for path, kind in [*common, *of_units]:
+        if kind not in TYPES and kind is not None:
+            findings.add(path, expected(f"one of {', '.join(TYPES)}", kind).message())
+        elif known and kind not in (None, known[0]):
+            what = f"{known[0]} as before, since one cluster cannot mix CMGs and reaction wheels"
+            findings.add(path, expected(what, kind).message())
+        elif kind is not None:
+            known.append(kind)
+    findings.raise_any()
+    return value
+
+
+def cluster_type(value: Any) -> str:
+    """The branch of the union, by the cluster's type or by that of a unit."""
+    if not isinstance(value, dict):
+        return "<wheel>" if isinstance(value, WheelCluster) else "<cmg>"
+    units = value.get("units")
+    said = [value.get("type")]
+    if said == [None] and isinstance(units, list | tuple):
+        said = [unit.get("type") for unit in units if isinstance(unit, dict)]
+    return "<wheel>" if "wheel" in said else "<cmg>"
+
+
+AnyCluster = Annotated[
+    Annotated[Cluster, Tag("<cmg>")] | Annotated[WheelCluster, Tag("<wheel>")],
+    Discriminator(cluster_type),
+    BeforeValidator(_known_type),
+]
