@@ -17,7 +17,7 @@ from quietbus.dynamics.linearize import Actuator, LinearModel, OperatingPoint
 from quietbus.dynamics.linearize import linearize as linearize_satellite
 from quietbus.dynamics.vibration import View
 from quietbus.jitter_study import JitterStudy
-from quietbus.results import aliasing, to_dataset
+from quietbus.results import aliasing, rotor_notes, to_dataset
 from quietbus.scenario import Scenario, load_scenario
 from quietbus.solve.direct import Scheme, Tolerances, integrate
 from quietbus.solve.harmonic import integrate_harmonic, on_periodic_solution
@@ -90,9 +90,9 @@ def simulate(
         if points or lines_of_sight:
             raise ValueError("points and lines_of_sight need method 'harmonic'")
         scenario = _as_run(scenario, mount, duration, output_rate)
-        notes = tuple(filter(None, [aliasing(scenario)]))
         run = _direct(scenario, joint_forces, progress)
-    for note in notes:
+        notes = tuple(filter(None, [aliasing(scenario)]))
+    for note in (*notes, *rotor_notes(run)):
         warnings.warn(note, QuietbusWarning, stacklevel=2)
     if run.attrs["status"] == "stopped":
         raise SimulationError(run.attrs["stop_reason"], run)
@@ -136,7 +136,11 @@ def compare(
             concurrent.futures.wait(futures.values())
         except KeyboardInterrupt:
             stop.set()
-        return {mount: future.result() for mount, future in futures.items()}
+        runs = {mount: future.result() for mount, future in futures.items()}
+    for mount, finished in runs.items():
+        for note in rotor_notes(finished):
+            warnings.warn(f"{mount}: {note}", QuietbusWarning, stacklevel=2)
+    return runs
 
 
 def analyze(scenario: Scenario | str, gimbal_angle: ArrayLike | None = None) -> Study:

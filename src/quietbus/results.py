@@ -18,6 +18,7 @@ from quietbus.analysis.jitter import combine
 from quietbus.analysis.residual import residual, shows
 from quietbus.model.cmg import ORDERS
 from quietbus.scenario import Scenario
+from quietbus.scenario.wheels import WheelCluster
 from quietbus.solve.direct import SLOW, Scheme, Solution
 from quietbus.solve.harmonic import TOLERANCES, HarmonicSolution, Jitter
 
@@ -55,6 +56,13 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
         "1",
         "sqrt(det(A A^T)) of the cluster's torque directions, weighted by momentum",
     ),
+}
+# of runs whose rotor speeds change
+ROTOR_VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
+    "rotor_angle": (("cmg",), "rad", "rotor angles"),
+    "rotor_speed": (("cmg",), "rad/s", "rotor speeds, relative to the unit's body"),
+    "rotor_torque": (("cmg",), "N m", "torque of the motor on its rotor"),
+    "torque_share": ((), "1", "part of the torque asked for that the wheels' limits leave"),
 }
 JOINT_VARIABLES = {
     "spherical_force": (
@@ -112,6 +120,11 @@ def to_dataset(
         solution, tolerances = solution.slow, TOLERANCES
     data = {
         name: _variable(getattr(solution.outputs, name), *VARIABLES[name]) for name in VARIABLES
+    }
+    data |= {
+        name: _variable(getattr(solution.outputs, name), *description)
+        for name, description in ROTOR_VARIABLES.items()
+        if getattr(solution.outputs, name) is not None
     }
     joints = solution.outputs.joint_forces
     if joints is not None:
@@ -316,6 +329,8 @@ class Summary:
     peak_stroke: float  # [m]
     peak_strut_force: float  # [N]
     minimum_singularity: float  # [-]
+    rotor_speeds: np.ndarray | None  # (2,) [rad/s] least and largest, where speeds change
+    peak_rotor_torque: float | None  # [N m] likewise
 
     def to_dict(self) -> dict[str, object]:
         """Numbers and lists, for JSON."""
@@ -343,6 +358,8 @@ def summarize(run: xr.Dataset) -> Summary:
             note = f"from t = {rest.window[0]:.4g} s to {rest.window[1]:.4g} s"
         except ValueError as too_short:
             note = str(too_short)
+    changing = "rotor_speed" in run
+    speed = run["rotor_speed"].to_numpy() if changing else np.zeros(1)
     return Summary(
         residual_rate=jitter,
         residual_rate_rms=rms,
@@ -353,12 +370,56 @@ def summarize(run: xr.Dataset) -> Summary:
         peak_stroke=peak("leg_stroke"),
         peak_strut_force=peak("leg_force"),
         minimum_singularity=float(run["singularity_measure"].min()),
+        rotor_speeds=np.array([speed.min(), speed.max()]) if changing else None,
+        peak_rotor_torque=peak("rotor_torque") if changing else None,
     )
 
 
-def aliasing(scenario: Scenario) -> str:
-    """Why the output rate cannot show the rotors' lines, or an empty text if it can."""
-    speeds = [abs(unit.rotor.speed) for unit in scenario.cluster.placed() if unit.rotor]
+def rotor_notes(run: xr.Dataset) -> list[str]:
+    """What the user has to know of rotors whose speed changed, in words.
+
+    Wheels at their limits, and speeds at which the output no longer shows the rotors' lines.
+    """
+    said: list[str] = []
+    if "rotor_speed" not in run:
+        return said
+    scenario, time = scenario_of(run), run["time"].to_numpy()
+    speeds = np.abs(run["rotor_speed"].to_numpy())
+    if run.attrs["method"] == "direct" and not aliasing(scenario):
+        said += filter(None, [aliasing(scenario, float(speeds.max()))])
+    cluster = scenario.cluster
+    if not isinstance(cluster, WheelCluster):
+        return said
+    for j, wheel in enumerate(cluster.placed()):
+        limit = wheel.motor and wheel.motor.speed_limit
+        reached = time[speeds[:, j] >= (1.0 - 1e-6) * (limit or np.inf)]
+        if reached.size and cluster.run_up is None:
+            said.append(
+                f"wheel {j} reached its speed limit of {limit:.5g} rad/s at t = {reached[0]:.4g} s: "
+                "there it gives no torque that would take it further, and the satellite does not "
+                "feel all that the control asks for"
+            )
+    if "torque_share" in run:
+        share = run["torque_share"].to_numpy()
+        cut = time[share < 1.0]
+        if cut.size:
+            said.append(
+                f"the wheels' torque limit cut the torque to {100 * share.min():.3g} % of what was "
+                f"asked for at the least, first at t = {cut[0]:.4g} s, in "
+                f"{100 * cut.size / time.size:.3g} % of the outputs"
+            )
+    return said
+
+
+def aliasing(scenario: Scenario, speed: float = 0.0) -> str:
+    """Why the output rate cannot show the rotors' lines, or an empty text if it can.
+
+    Args:
+        speed: [rad/s] that a rotor has reached, if that is more than the scenario says.
+    """
+    speeds = [speed, *np.abs(_rotors(scenario)[0])]
+    if scenario.cluster.run_up is not None:
+        speeds += np.abs(scenario.cluster.run_up.speeds(tuple(speeds[1:]))).ravel().tolist()
     fastest = max(speeds) / (2.0 * np.pi)
     rate = scenario.simulation.output_rate
     if shows(rate, fastest):

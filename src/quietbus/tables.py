@@ -53,7 +53,12 @@ def summary_table(summaries: Mapping[str, Summary]) -> Table:
             value = lambda s, i=i, field=field: _degrees(getattr(s, field), i)  # noqa: E731
             row(name.format(axis), "deg/s", value, ratio=field != "slow_rate")
     row("pointing error at the end", "deg", lambda s: math.degrees(s.pointing_error))
-    row("peak gimbal rate", "deg/s", lambda s: math.degrees(s.peak_gimbal_rate))
+    if first.rotor_speeds is None or first.peak_gimbal_rate > 0.0:
+        row("peak gimbal rate", "deg/s", lambda s: math.degrees(s.peak_gimbal_rate))
+    if first.rotor_speeds is not None:
+        for i, which in enumerate(("least", "largest")):
+            row(f"{which} rotor speed", "rpm", lambda s, i=i: _rpm(s.rotor_speeds, i))
+        row("peak rotor torque", "N m", lambda s: _known(s.peak_rotor_torque))
     row("largest strut stroke", "mm", lambda s: 1e3 * s.peak_stroke)
     row("largest strut force", "N", lambda s: s.peak_strut_force)
     row("least singularity measure", "-", lambda s: s.minimum_singularity)
@@ -62,6 +67,14 @@ def summary_table(summaries: Mapping[str, Summary]) -> Table:
 
 def _degrees(vector: Sequence[float] | None, i: int) -> float:
     return math.nan if vector is None else math.degrees(vector[i])
+
+
+def _rpm(speeds: Sequence[float] | None, i: int) -> float:
+    return math.nan if speeds is None else speeds[i] * 30.0 / math.pi
+
+
+def _known(value: float | None) -> float:
+    return math.nan if value is None else value
 
 
 def checks_table(name: str, checks: Sequence[Check]) -> Table:

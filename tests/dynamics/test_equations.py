@@ -399,7 +399,7 @@ def balances(satellite, state, rate):
     """Rates of linear and angular momentum of all bodies; joint forces and motion."""
 
     def momenta(t, state):
-        bodies = body_motions(satellite, rotor_angles(satellite, t), state)
+        bodies = body_motions(satellite, rotor_angles(satellite, t, state), state)
         linear = bodies.mass[:, None] * bodies.v_N
         angular = jnp.cross(bodies.p_N, linear) + jnp.einsum("bij,bj->bi", bodies.I_N, bodies.w_N)
         return linear, angular

@@ -45,7 +45,7 @@ def _rate_over_time(quantity, satellite, state):
     @eqx.filter_jit
     def rate(satellite, t, state):
         def at(t, state):
-            return quantity(satellite, rotor_angles(satellite, t), state)
+            return quantity(satellite, rotor_angles(satellite, t, state), state)
 
         return jax.jvp(at, (t, state), (jnp.ones(()), state_rate(satellite, t, state)))[1]
 

@@ -48,6 +48,11 @@ class ControlMomentGyro(eqx.Module):
     drive: RotorDrive | None = None  # None: constant speed
 
     @property
+    def wheels(self) -> bool:
+        """Whether the units are reaction wheels, which have no gimbal motion."""
+        return isinstance(self.drive, WheelMotors)
+
+    @property
     def run_up(self) -> RunUp | None:
         """The prescribed change of speed, if there is one."""
         return self.drive.run_up if isinstance(self.drive, WheelMotors) else self.drive

@@ -1,5 +1,7 @@
 """A satellite with something taken out of it, for checks and for "what if"."""
 
+from dataclasses import replace
+
 import equinox as eqx
 import jax.numpy as jnp
 
@@ -23,9 +25,10 @@ def without_friction(satellite: Satellite) -> Satellite:
 
 
 def without_rotation(satellite: Satellite) -> Satellite:
-    """The satellite with its rotors at a standstill."""
-    speed = lambda s: s.cluster.rotor_speed  # noqa: E731
-    return eqx.tree_at(speed, satellite, 0.0 * speed(satellite))
+    """The satellite with its rotors at a standstill, which they keep."""
+    cluster = satellite.cluster
+    still = replace(cluster, rotor_speed=0.0 * cluster.rotor_speed, drive=None)
+    return replace(satellite, cluster=still)
 
 
 def balanced(satellite: Satellite) -> Satellite:

@@ -27,6 +27,7 @@ from quietbus.model.variants import without_friction, without_rotation
 from quietbus.validate.reference import Reference
 from quietbus.validate.states import kicked_state, random_state, random_wrench
 from quietbus.validate.trajectory import (
+    at_constant_speed,
     fly,
     fly_mujoco_to,
     held_gimbals,
@@ -103,15 +104,19 @@ def check_accelerations(satellite: Satellite, count: int, rng: np.random.Generat
     for _ in range(count):
         state, wrench = random_state(satellite, rng), random_wrench(satellite, rng)
         rotor_angle = jnp.asarray(rng.uniform(0.0, 2.0 * np.pi, cmgs))
-        gimbal_acceleration = jnp.asarray(rng.uniform(-5.0, 5.0, cmgs))
+        swing = 0.0 if satellite.cluster.wheels else 5.0
+        gimbal_acceleration = jnp.asarray(rng.uniform(-swing, swing, cmgs))
         arguments = (state, rotor_angle, gimbal_acceleration, wrench)
-        theirs = jax.tree.leaves(reference.accelerations(*arguments))
-        for a, b in zip(theirs, jax.tree.leaves(ours(satellite, *arguments)), strict=True):
+        spin_up = None if state.rotor is None else jnp.asarray(rng.uniform(-20.0, 20.0, cmgs))
+        theirs = jax.tree.leaves(reference.accelerations(*arguments, spin_up))
+        found = jax.tree.leaves(ours(satellite, *arguments, None, spin_up))
+        for a, b in zip(theirs, found, strict=True):
             errors.append(float(np.linalg.norm(a - b) / np.linalg.norm(a)))
     return Check(
         "accelerations",
-        f"{count} random states against MuJoCo: legs with mass and joint friction, gimbals "
-        "accelerating, external loads",
+        f"{count} random states against MuJoCo: legs with mass and joint friction, "
+        f"{'rotors' if satellite.cluster.drive is not None else 'gimbals'} accelerating, "
+        "external loads",
         float(np.max(errors)),
         1e-9,
     )
@@ -120,8 +125,9 @@ def check_accelerations(satellite: Satellite, count: int, rng: np.random.Generat
 def check_trajectory(
     satellite: Satellite, state: State, wrench: Wrench, times: np.ndarray
 ) -> Check:
-    """A flight with the gimbals turning at constant rate, under a constant load."""
+    """A flight with gimbals and rotors turning at constant rates, under a constant load."""
     bound = 1e-8
+    satellite, state = at_constant_speed(satellite, state)
     struts = massless_legs(satellite)
     ours = fly(held_gimbals(struts, wrench), state, jnp.asarray(times))
     theirs, own_error = fly_mujoco_to(0.1 * bound, struts, state, wrench, times)
@@ -158,7 +164,7 @@ def check_energy(satellite: Satellite, state: State, times: np.ndarray) -> Check
     """Energy of a flight without damping, friction, rotor and gimbal motion."""
     locked, at_rest = (
         lossless(satellite),
-        replace(state, gimbal_rate=jnp.zeros_like(state.gimbal_rate)),
+        replace(state, gimbal_rate=jnp.zeros_like(state.gimbal_rate), rotor=None),
     )
     states = fly(locked, at_rest, jnp.asarray(times))
     energy = over_time(kinetic_energy, locked, times, states)
@@ -187,6 +193,6 @@ def over_time(
     """A function of satellite, rotor angles and state at every time of a flight."""
 
     def at(t, state):
-        return quantity(satellite, rotor_angles(satellite, t), state)
+        return quantity(satellite, rotor_angles(satellite, t, state), state)
 
     return np.asarray(jax.jit(jax.vmap(at))(jnp.asarray(times), states))

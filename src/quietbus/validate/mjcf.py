@@ -2,7 +2,8 @@
 
 Bus and plate are free bodies, or the plate is welded to the bus (``mount: rigid``). Each CMG is a
 gimbal body on a hinge in the plate and a rotor on a hinge in the gimbal body; a huge armature on
-these hinges prescribes their motion while the motor's reaction still acts. The legs are
+these hinges prescribes their motion while the motor's reaction still acts. Reaction wheels have their
+housing, without a hinge, for the gimbal body. The legs are
 
 - ``tendons``: massless struts between two points, exact for legs without mass and joint friction;
 - ``bodies``: trees on the bus, universal joint (hinge about the fixed axis k, hinge about the
@@ -11,7 +12,8 @@ these hinges prescribes their motion while the motor's reaction still acts. The 
   errors of some 0.1 mm. ``quietbus.validate.reference`` closes the legs exactly instead. The
   friction of the spherical joints has no counterpart in the file.
 
-Loads and control are not part of the file; gimbals and rotors keep their rates.
+Loads and control are not part of the file; gimbals and rotors keep their rates, unless a torque of
+``ARMATURE`` times an acceleration is applied to a hinge.
 """
 
 import xml.etree.ElementTree as ET
@@ -49,9 +51,10 @@ def write_mjcf(
         state: motion at the keyframe.
         legs: massless springs and dampers, or bodies (see above).
         timestep: of MuJoCo's fourth-order Runge-Kutta integrator [s].
-        rotor_angle: (cmg,) rotor angles at the keyframe [rad]; the rotor phases by default.
+        rotor_angle: (cmg,) rotor angles at the keyframe [rad]; those at the start by default.
     """
-    phi = np.asarray(satellite.cluster.rotor_phase if rotor_angle is None else rotor_angle)
+    start = satellite.cluster.rotor_phase if state.rotor is None else state.rotor.angle
+    phi = np.asarray(start if rotor_angle is None else rotor_angle)
     root = ET.Element("mujoco", model="quietbus")
     ET.SubElement(root, "compiler", angle="radian", balanceinertia="false", inertiafromgeom="false")
     option = ET.SubElement(
@@ -128,11 +131,13 @@ def coordinates(
         ),
     }
     cluster = satellite.cluster
-    for j, speed in enumerate(np.asarray(cluster.rotor_speed)):
-        values[f"gimbal{j}"] = (
-            np.asarray(state.gimbal_angle)[j : j + 1],
-            np.asarray(state.gimbal_rate)[j : j + 1],
-        )
+    speeds = cluster.rotor_speed if state.rotor is None else state.rotor.speed
+    for j, speed in enumerate(np.asarray(speeds)):
+        if not cluster.wheels:
+            values[f"gimbal{j}"] = (
+                np.asarray(state.gimbal_angle)[j : j + 1],
+                np.asarray(state.gimbal_rate)[j : j + 1],
+            )
         values[f"rotor{j}"] = (rotor_angle[j : j + 1], np.array([speed]))
 
     R_NB, R_NP = _rotation(q_NB).as_matrix(), _rotation(q_NP).as_matrix()
@@ -238,7 +243,8 @@ def _cluster(plate: ET.Element, satellite: Satellite) -> None:
             pos=_text(cluster.p_PC_P[j]),
             quat=_matrix_quaternion(cluster.R_PG0[j]),
         )
-        _hinge(gimbal, f"gimbal{j}", "0 0 1")
+        if not cluster.wheels:
+            _hinge(gimbal, f"gimbal{j}", "0 0 1")
         _inertial(gimbal, cluster.gimbal_mass[j], cluster.p_CGcm_G[j], cluster.I_GGcm_G[j])
         _shape(gimbal, "gimbal", "cylinder", fromto="0 0 -0.12 0 0 0.12", size="0.02")
         rotor = ET.SubElement(

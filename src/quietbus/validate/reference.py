@@ -5,7 +5,7 @@ MuJoCo gives the mass matrix, the bias force, passive forces and Jacobians of tw
 ties the trees together is solved here exactly. The constraints on the joint accelerations a are
 
     (J_tip - J_U) a = -(dJ_tip/dt - dJ_U/dt) v     each leg's tip stays in its spherical joint
-    a_gimbal = given,  a_rotor = 0                 the servos
+    a_gimbal = given,  a_rotor = given             the servos; 0 for rotors of constant speed
 
 With N a basis of the accelerations that they leave free and a0 one solution of them,
 ``a = a0 + N x`` and ``N^T M N x = N^T (f - M a0)``: the constraint forces do no virtual work.
@@ -39,7 +39,7 @@ class Reference:
                 self._model.joint(f"{kind}{j}").dofadr[0]
                 for j in range(len(satellite.cluster.rotor_speed))
             ]
-            for kind in ("gimbal", "rotor")
+            for kind in (("rotor",) if satellite.cluster.wheels else ("gimbal", "rotor"))
         }
 
     def accelerations(
@@ -48,13 +48,18 @@ class Reference:
         rotor_angle: Float[Array, " cmg"],
         gimbal_acceleration: Float[Array, " cmg"],
         wrench: Wrench,
+        rotor_acceleration: Float[Array, " cmg"] | None = None,
     ) -> Accelerations:
-        """As ``quietbus.dynamics.equations.accelerations``."""
+        """As ``quietbus.dynamics.equations.accelerations``; wheels have no gimbal accelerations."""
         model, data = self._model, self._data
         self._set(state, rotor_angle)
         force = data.qfrc_passive - data.qfrc_bias + self._friction() + self._loads(wrench)
         M = self._mass_matrix()
-        G, given = self._constraints(np.asarray(gimbal_acceleration))
+        still = np.zeros(len(rotor_angle))
+        spin_up = still if rotor_acceleration is None else np.asarray(rotor_acceleration)
+        G, given = self._constraints(
+            {"gimbal": np.asarray(gimbal_acceleration), "rotor": spin_up}
+        )
         a0, N = np.linalg.lstsq(G, given, rcond=None)[0], null_space(G)
         a = a0 + N @ np.linalg.solve(N.T @ M @ N, N.T @ (force - M @ a0))
         blocks = []
@@ -92,17 +97,16 @@ class Reference:
             M[:, i] = column
         return M
 
-    def _constraints(self, gimbal_acceleration: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _constraints(self, servos: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Matrix and right-hand side of the constraints on the joint accelerations."""
         rows, given = [], []
         for i in self._legs:
             tip, on_plate = self._leg_end(i)
             rows.append(tip[0] - on_plate[0])
             given.append(-(tip[1] - on_plate[1]) @ self._data.qvel)
-        rotor_acceleration = np.zeros(len(self._servos["rotor"]))
-        for kind, value in (("gimbal", gimbal_acceleration), ("rotor", rotor_acceleration)):
-            rows.append(np.eye(self._model.nv)[self._servos[kind]])
-            given.append(value)
+        for kind, freedoms in self._servos.items():
+            rows.append(np.eye(self._model.nv)[freedoms])
+            given.append(servos[kind])
         return np.concatenate(rows), np.concatenate(given)
 
     def _leg_end(self, i: int) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:

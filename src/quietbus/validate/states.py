@@ -8,6 +8,7 @@ from jaxtyping import Array, Float
 
 from quietbus.dynamics.equations import Wrench
 from quietbus.dynamics.state import State
+from quietbus.model.rotor import RotorState
 from quietbus.model.satellite import Satellite
 from quietbus.spatial.rotation import (
     quaternion_multiply,
@@ -19,10 +20,12 @@ from quietbus.spatial.rotation import (
 def random_state(satellite: Satellite, rng: np.random.Generator) -> State:
     """Tumbling bus, displaced and moving plate, gimbals at any angle and turning.
 
+    Rotors whose speeds change have any speed up to 600 rad/s.
     Velocities are up to 1 m/s and 1 rad/s per axis. Relative to its nominal pose an isolated plate
     is displaced by up to 5 % of the shortest leg and turned by up to 0.05 rad per axis.
     """
     cmgs = len(satellite.cluster.rotor_speed)
+    swing = 0.0 if satellite.cluster.wheels else 1.0
     q_NB = rng.normal(size=4)
     free = satellite.mount == "isolated"
     shift = 0.05 * free * float(np.min(satellite.legs.nominal_length))
@@ -37,9 +40,10 @@ def random_state(satellite: Satellite, rng: np.random.Generator) -> State:
             w_NB_B=_box(rng, 3, 1.0),
             v_NP_N=jnp.zeros(3),
             w_NP_P=jnp.zeros(3),
-            gimbal_angle=_box(rng, cmgs, np.pi),
-            gimbal_rate=_box(rng, cmgs, 1.0),
+            gimbal_angle=_box(rng, cmgs, np.pi * swing),
+            gimbal_rate=_box(rng, cmgs, swing),
             error_integral=jnp.zeros(3),
+            rotor=_random_rotors(satellite, rng),
         ),
         _box(rng, 3, shift),
         _box(rng, 3, 0.05 * free),
@@ -61,7 +65,7 @@ def kicked_state(satellite: Satellite, state: State, rng: np.random.Generator) -
         state,
         v_NB_N=state.v_NB_N + _box(rng, 3, 0.01),
         w_NB_B=state.w_NB_B + _box(rng, 3, 0.05),
-        gimbal_rate=_box(rng, cmgs, 0.3),
+        gimbal_rate=_box(rng, cmgs, 0.0 if satellite.cluster.wheels else 0.3),
     )
     return with_plate(
         satellite,
@@ -114,6 +118,13 @@ def random_wrench(satellite: Satellite, rng: np.random.Generator) -> Wrench:
     )
     scale = force * jnp.array([[1.0], [arm], [1.0], [arm]])
     return Wrench(*(scale * _box(rng, 12, 1.0).reshape(4, 3)))
+
+
+def _random_rotors(satellite: Satellite, rng: np.random.Generator) -> RotorState | None:
+    if satellite.cluster.drive is None:
+        return None
+    count = len(satellite.cluster.rotor_speed)
+    return RotorState(_box(rng, count, np.pi), _box(rng, count, 600.0))
 
 
 def _box(rng: np.random.Generator, n: int, half: float) -> Float[Array, " n"]:

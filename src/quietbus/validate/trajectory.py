@@ -25,7 +25,7 @@ from quietbus.model.satellite import Satellite
 from quietbus.model.variants import without_friction, without_leg_mass
 from quietbus.spatial.inertia import point_inertia
 from quietbus.validate.engine import import_mujoco
-from quietbus.validate.mjcf import nominal_spans_B, write_mjcf
+from quietbus.validate.mjcf import ARMATURE, nominal_spans_B, write_mjcf
 
 
 def massless_legs(satellite: Satellite) -> Satellite:
@@ -42,6 +42,14 @@ def held_gimbals(satellite: Satellite, wrench: Wrench) -> Satellite:
     )
     servo = replace(satellite.servo, bandwidth=jnp.zeros(()))
     return replace(satellite, controller=None, steering=None, loads=loads, servo=servo)
+
+
+def at_constant_speed(satellite: Satellite, state: State) -> tuple[Satellite, State]:
+    """Satellite and state with rotors that keep the speeds which they have in the state."""
+    if state.rotor is None:
+        return satellite, state
+    cluster = replace(satellite.cluster, rotor_speed=state.rotor.speed)
+    return replace(satellite, cluster=cluster), replace(state, rotor=None)
 
 
 @eqx.filter_jit
@@ -110,14 +118,15 @@ def fly_mujoco(
     """States at the given times [s] by MuJoCo's fourth-order Runge-Kutta method.
 
     Args:
-        satellite: legs have to be massless and joints without friction.
+        satellite: legs have to be massless and joints without friction; a run-up has to be linear
+            and to last for all of the flight.
         wrench: constant load.
         times: equally spaced.
         timestep: upper bound [s]; the spacing of the times is divided evenly.
     """
     mujoco = import_mujoco()
     steps = int(np.ceil((times[1] - times[0]) / timestep - 1e-9))
-    phi = np.asarray(rotor_angles(satellite, times[0]))
+    phi = np.asarray(rotor_angles(satellite, times[0], state))
     xml = write_mjcf(satellite, state, "tendons", (times[1] - times[0]) / steps, phi)
     model = mujoco.MjModel.from_xml_string(xml)
     data = mujoco.MjData(model)
@@ -127,6 +136,10 @@ def fly_mujoco(
         ("bus", wrench.force_B, wrench.torque_B),
     ):
         data.xfrc_applied[data.body(body).id] = np.concatenate([force, torque])
+    if satellite.cluster.run_up is not None and state.rotor is not None:
+        acceleration = np.asarray(satellite.cluster.run_up.acceleration(jnp.asarray(times[0])))
+        for j, spin_up in enumerate(acceleration):
+            data.qfrc_applied[model.joint(f"rotor{j}").dofadr[0]] = ARMATURE * spin_up
     states = [_read(mujoco, model, data, satellite)]
     for _ in times[1:]:
         mujoco.mj_step(model, data, steps)
@@ -203,6 +216,10 @@ def _read(mujoco, model, data, satellite: Satellite) -> State:
         rate = body.xmat.reshape(3, 3).T @ Jw @ data.qvel
         bodies.append((body.xpos.copy(), body.xquat.copy(), J @ data.qvel, rate))
     cmgs = range(len(satellite.cluster.rotor_speed))
+    gimbals = np.zeros((2, len(cmgs)))  # wheels have none
+    if not satellite.cluster.wheels:
+        joints = [data.joint(f"gimbal{j}") for j in cmgs]
+        gimbals = np.array([[joint.qpos[0], joint.qvel[0]] for joint in joints]).T
     (p_B, q_B, v_B, w_B), (p_P, q_P, v_P, w_P) = bodies
     return State(
         p_NB_N=p_B,
@@ -213,7 +230,7 @@ def _read(mujoco, model, data, satellite: Satellite) -> State:
         w_NB_B=w_B,
         v_NP_N=v_P,
         w_NP_P=w_P,
-        gimbal_angle=jnp.array([data.joint(f"gimbal{j}").qpos[0] for j in cmgs]),
-        gimbal_rate=jnp.array([data.joint(f"gimbal{j}").qvel[0] for j in cmgs]),
+        gimbal_angle=gimbals[0],
+        gimbal_rate=gimbals[1],
         error_integral=jnp.zeros(3),
     )

@@ -77,7 +77,7 @@ def _accelerations(satellite, states, times: np.ndarray, wrench: Wrench) -> floa
     for i in np.linspace(0, len(times) - 1, LOOKS).astype(int):
         state = jax.tree.map(lambda leaf, i=i: leaf[i], states)
         still = jnp.zeros_like(state.gimbal_angle)
-        arguments = (state, rotor_angles(satellite, times[i]), still, wrench)
+        arguments = (state, rotor_angles(satellite, times[i], state), still, wrench)
         theirs = jax.tree.leaves(reference.accelerations(*arguments))
         ours = jax.tree.leaves(accelerations(satellite, *arguments))
         scale = max(np.linalg.norm(a) for a in theirs)
