@@ -11,8 +11,9 @@ from quietbus.model.cmg import ControlMomentGyro
 from quietbus.model.controller import GimbalServo, PIDController
 from quietbus.model.guidance import StepGuidance
 from quietbus.model.hexapod import Hexapod, LegParts
+from quietbus.model.rotor import RunUp, WheelMotors
 from quietbus.model.satellite import Satellite
-from quietbus.model.steering import SingularityRobust
+from quietbus.model.steering import PseudoInverse, SingularityRobust
 from quietbus.spatial.rotation import (
     quaternion_to_matrix,
     rotation_vector_to_matrix,
@@ -88,6 +89,24 @@ def awkward_satellite(mount: Mount = "isolated", imbalance: float = 1.0) -> Sate
     )
     plate = Plate(satellite.plate.mass, _array([0.01, -0.02, 0.03]), satellite.plate.I_PPcm_P + 0.1)
     return replace(satellite, legs=legs, cluster=cluster, plate=plate, q_BP=q_BP)
+
+
+def with_wheels(satellite: Satellite) -> Satellite:
+    """The satellite with reaction wheels, spinning about what were the gimbal axes, unlike fast."""
+    speed = _array([90.0, -110.0, 70.0, 0.0])
+    R_PG0 = jnp.roll(satellite.cluster.R_PG0, 1, axis=2)
+    wheels = WheelMotors(None, None)
+    cluster = replace(satellite.cluster, drive=wheels, rotor_speed=speed, R_PG0=R_PG0)
+    servo = GimbalServo(_array(0.0), None, None)
+    return replace(satellite, cluster=cluster, servo=servo, steering=PseudoInverse())
+
+
+def with_run_up(satellite: Satellite, shape: Literal["smooth", "linear"] = "linear") -> Satellite:
+    """The satellite with its rotors running up, down, through rest and not at all."""
+    initial, final = _array([0.0, 100.0, -60.0, 80.0]), _array([150.0, 40.0, 60.0, 80.0])
+    one = jnp.ones(4)
+    drive = RunUp(initial, final, 0.0 * one, 1.5 * one, shape)
+    return replace(satellite, cluster=replace(satellite.cluster, drive=drive))
 
 
 def _legs() -> Hexapod:

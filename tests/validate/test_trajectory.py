@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from oracles.satellites import awkward_satellite, paper_satellite
+from oracles.satellites import awkward_satellite, paper_satellite, with_run_up
 from quietbus.dynamics.closed_loop import initial_state
 from quietbus.dynamics.equations import Wrench
 from quietbus.validate.states import kicked_state, random_wrench
@@ -46,6 +46,19 @@ def test_flight_with_spinning_unbalanced_rotors_agrees_with_mujoco(make, imbalan
     theirs, own_error = fly_mujoco_to(1e-9, satellite, state, wrench, TIMES)
     assert own_error <= 1e-9
     assert largest_difference(theirs, ours) <= 1e-8
+
+
+def test_flight_with_rotors_running_up_agrees_with_mujoco():
+    """Constant motor accelerations, one rotor through rest; gimbals turning, 1000 x imbalance."""
+    satellite = with_run_up(massless_legs(awkward_satellite(imbalance=1000.0)))
+    rng = np.random.default_rng(3)
+    state = kicked_state(satellite, _start(satellite), rng)
+    wrench = random_wrench(satellite, rng)
+    ours = fly(held_gimbals(satellite, wrench), state, jnp.asarray(TIMES))
+    theirs, own_error = fly_mujoco_to(1e-9, satellite, state, wrench, TIMES)
+    assert own_error <= 1e-9
+    assert largest_difference(theirs, ours) <= 1e-8
+    np.testing.assert_allclose(ours.rotor.speed[-1], [100.0, 60.0, 20.0, 80.0], rtol=1e-9)
 
 
 def test_load_case_of_the_paper_agrees_with_mujoco():
