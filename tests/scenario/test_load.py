@@ -25,7 +25,7 @@ def refusal(text: str) -> str:
     return str(error.value)
 
 
-@pytest.mark.parametrize("name", ["zhang2012", "zhang2012-slew"])
+@pytest.mark.parametrize("name", ["wheels-demo", "zhang2012", "zhang2012-slew"])
 def test_builtin_comes_back_from_its_own_yaml(name):
     scenario = load_scenario(name)
     text = scenario.to_yaml()
@@ -36,7 +36,7 @@ def test_builtin_comes_back_from_its_own_yaml(name):
 
 
 def test_builtins_are_listed():
-    assert builtin_names() == ["zhang2012", "zhang2012-slew"]
+    assert builtin_names() == ["wheels-demo", "zhang2012", "zhang2012-slew"]
 
 
 def test_slew_flies_the_same_satellite():
@@ -165,7 +165,7 @@ def test_broken_text(text, message):
         (
             "zhang2021",
             "zhang2021: no such file, and no built-in scenario of that name "
-            "(did you mean zhang2012?); built in: zhang2012, zhang2012-slew",
+            "(did you mean zhang2012?); built in: wheels-demo, zhang2012, zhang2012-slew",
         ),
         ("folder/none.yaml", "folder/none.yaml: no such file"),
         (".", ".: cannot be read: Is a directory"),

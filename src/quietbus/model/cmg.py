@@ -161,7 +161,9 @@ class ClusterMoments(eqx.Module):
         moments = [jnp.moveaxis(m, -1, 0) for m in eqx.filter_vmap(unit)(cluster)]
         H_speed = None
         if cluster.drive is not None:
-            at_one = eqx.tree_at(lambda c: c.rotor_speed, cluster, jnp.ones_like(cluster.rotor_speed))
+            at_one = eqx.tree_at(
+                lambda c: c.rotor_speed, cluster, jnp.ones_like(cluster.rotor_speed)
+            )
             H_speed = jnp.moveaxis(eqx.filter_vmap(unit)(at_one)[0], -1, 0)[3:]
         return cls(mass, cluster.rotor_speed, *moments, H_speed)
 
@@ -270,9 +272,7 @@ class ClusterMoments(eqx.Module):
             H=at[:, 3:] + times(rate * one, H_gimbal),
             J_rate=times(b1, J)[:, _SYMMETRIC],
             p_rate=at_second[:, :3],
-            H_rate=at_rate[:, 3:]
-            + times(rate * b1 + acceleration * one, H_gimbal)
-            + spin_up,
+            H_rate=at_rate[:, 3:] + times(rate * b1 + acceleration * one, H_gimbal) + spin_up,
         )
 
 

@@ -326,7 +326,9 @@ class Placed(Part):
         for azimuth in 2.0 * np.pi * np.arange(self.count) / self.count:
             r = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
             position = self.pyramid.radius * r + self.pyramid.height * z
-            found.append((r, position, np.sin(self.pyramid.skew) * r + np.cos(self.pyramid.skew) * z))
+            found.append(
+                (r, position, np.sin(self.pyramid.skew) * r + np.cos(self.pyramid.skew) * z)
+            )
         return found
 
     def completed(self) -> tuple[Any, ...]:
@@ -372,7 +374,8 @@ class Placed(Part):
         for path, (values, what) in lists.items():
             if isinstance(values, tuple) and len(values) != self.count:
                 findings.add(
-                    path, f"expected {self.count} {what}, one for each {self.NOUN}, got {len(values)}"
+                    path,
+                    f"expected {self.count} {what}, one for each {self.NOUN}, got {len(values)}",
                 )
         findings.raise_any()
         return self

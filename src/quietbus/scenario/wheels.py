@@ -91,6 +91,15 @@ class WheelCluster(Placed):
         """Speeds at the start, and those of a run-up, are within the motors' limits."""
         findings = Findings()
         wheels = self.placed()
+        without = [
+            j for j, wheel in enumerate(wheels) if not (wheel.motor and wheel.motor.torque_limit)
+        ]
+        if 0 < len(without) < len(wheels):
+            findings.add(
+                ("units", without[0], "motor"),
+                "expected a torque_limit, as other wheels have one: wheels share a torque by their "
+                "limits",
+            )
         nominal = tuple(wheel.rotor.speed for wheel in wheels if wheel.rotor)
         given = {"rotor": nominal}
         if self.run_up:

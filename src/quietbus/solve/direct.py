@@ -195,7 +195,9 @@ def _compiled_piece(satellite, state, numbers, scheme) -> _Piece:
     )
     states = jax.vmap(lambda y: _tidy(satellite, unravel(y)))(saved)
     reported = jax.vmap(
-        lambda t, s: outputs(satellite, t, s, scheme.joint_forces, moments if scheme.averaged else None)
+        lambda t, s: outputs(
+            satellite, t, s, scheme.joint_forces, moments if scheme.averaged else None
+        )
     )(ts, states)
     final = _tidy(satellite, unravel(last))
     return _Piece(

@@ -57,9 +57,7 @@ class Reference:
         M = self._mass_matrix()
         still = np.zeros(len(rotor_angle))
         spin_up = still if rotor_acceleration is None else np.asarray(rotor_acceleration)
-        G, given = self._constraints(
-            {"gimbal": np.asarray(gimbal_acceleration), "rotor": spin_up}
-        )
+        G, given = self._constraints({"gimbal": np.asarray(gimbal_acceleration), "rotor": spin_up})
         a0, N = np.linalg.lstsq(G, given, rcond=None)[0], null_space(G)
         a = a0 + N @ np.linalg.solve(N.T @ M @ N, N.T @ (force - M @ a0))
         blocks = []
