@@ -136,7 +136,7 @@ def compare(
             concurrent.futures.wait(futures.values())
         except KeyboardInterrupt:
             stop.set()
-        runs = {mount: future.result() for mount, future in futures.items()}
+        runs: dict[str, xr.Dataset] = {mount: future.result() for mount, future in futures.items()}
     for mount, finished in runs.items():
         for note in rotor_notes(finished):
             warnings.warn(f"{mount}: {note}", QuietbusWarning, stacklevel=2)

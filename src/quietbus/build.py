@@ -49,7 +49,8 @@ def build_satellite(
     isolator, cluster = scenario.isolator, scenario.cluster
     base = _rotation(isolator.orientation)
     phases = cluster.rotor_phases or (0.0,) * cluster.count
-    units = [_unit(unit, phase) for unit, phase in zip(cluster.placed(), phases, strict=True)]
+    placed: tuple[scenario_hardware.Unit | Wheel, ...] = cluster.placed()
+    units = [_unit(unit, phase) for unit, phase in zip(placed, phases, strict=True)]
     stacked = jax.tree.map(lambda *each: _array(np.stack(each)), *units)
     satellite = Satellite(
         bus=Bus(_array(scenario.bus.mass), _array(scenario.bus.inertia)),
@@ -147,9 +148,14 @@ def _drive(cluster: scenario_hardware.Cluster | WheelCluster) -> RotorDrive | No
     units, run_up = cluster.placed(), None
     if cluster.run_up is not None:
         said, one = cluster.run_up, np.ones(len(units))
-        speeds = said.speeds(tuple(unit.rotor.speed for unit in units))  # type: ignore[union-attr]
-        times = (_array(said.start * one), _array(said.duration * one))
-        run_up = RunUp(*(_array(speed) for speed in speeds), *times, said.shape)
+        initial, final = said.speeds(tuple(unit.rotor.speed for unit in units if unit.rotor))
+        run_up = RunUp(
+            _array(initial),
+            _array(final),
+            _array(said.start * one),
+            _array(said.duration * one),
+            said.shape,
+        )
     if not isinstance(cluster, WheelCluster):
         return run_up
     motors = [wheel.motor or cluster.motor for wheel in cluster.placed()]

@@ -395,9 +395,9 @@ def rotor_notes(run: xr.Dataset) -> list[str]:
         reached = time[speeds[:, j] >= (1.0 - 1e-6) * (limit or np.inf)]
         if reached.size and cluster.run_up is None:
             said.append(
-                f"wheel {j} reached its speed limit of {limit:.5g} rad/s at t = {reached[0]:.4g} s: "
-                "there it gives no torque that would take it further, and the satellite does not "
-                "feel all that the control asks for"
+                f"wheel {j} reached its speed limit of {limit:.5g} rad/s at t = "
+                f"{reached[0]:.4g} s: there it gives no torque that would take it further, and the "
+                "satellite does not feel all that the control asks for"
             )
     if "torque_share" in run:
         share = run["torque_share"].to_numpy()

@@ -11,6 +11,8 @@ from rich.table import Table
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
+    import numpy as np
+
     from quietbus.results import Summary
     from quietbus.study import Study
     from quietbus.validate import Check
@@ -56,8 +58,8 @@ def summary_table(summaries: Mapping[str, Summary]) -> Table:
     if first.rotor_speeds is None or first.peak_gimbal_rate > 0.0:
         row("peak gimbal rate", "deg/s", lambda s: math.degrees(s.peak_gimbal_rate))
     if first.rotor_speeds is not None:
-        for i, which in enumerate(("least", "largest")):
-            row(f"{which} rotor speed", "rpm", lambda s, i=i: _rpm(s.rotor_speeds, i))
+        row("least rotor speed", "rpm", lambda s: _rpm(s.rotor_speeds, 0))
+        row("largest rotor speed", "rpm", lambda s: _rpm(s.rotor_speeds, 1))
         row("peak rotor torque", "N m", lambda s: _known(s.peak_rotor_torque))
     row("largest strut stroke", "mm", lambda s: 1e3 * s.peak_stroke)
     row("largest strut force", "N", lambda s: s.peak_strut_force)
@@ -69,7 +71,7 @@ def _degrees(vector: Sequence[float] | None, i: int) -> float:
     return math.nan if vector is None else math.degrees(vector[i])
 
 
-def _rpm(speeds: Sequence[float] | None, i: int) -> float:
+def _rpm(speeds: np.ndarray | None, i: int) -> float:
     return math.nan if speeds is None else speeds[i] * 30.0 / math.pi
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -116,14 +117,12 @@ def imbalance_kinds(satellite: Satellite) -> list[Satellite]:
     products = inertia.at[:, 1, 2].set(0.0).at[:, 2, 1].set(0.0)
     products = products - jax.vmap(jnp.diag)(jnp.diagonal(inertia, axis1=1, axis2=2)) + even
     none = jnp.zeros_like(cluster.eccentricity)
-    return [
-        replace(satellite, cluster=replace(cluster, **changes))
-        for changes in (
-            {"R_GF": speed_axes, "I_RRcm_R": even},
-            {"R_GF": speed_axes, "I_RRcm_R": products, "eccentricity": none},
-            {"R_GF": speed_axes},
-        )
-    ]
+    kinds: tuple[dict[str, Any], ...] = (
+        {"R_GF": speed_axes, "I_RRcm_R": even},
+        {"R_GF": speed_axes, "I_RRcm_R": products, "eccentricity": none},
+        {"R_GF": speed_axes},
+    )
+    return [replace(satellite, cluster=replace(cluster, **changes)) for changes in kinds]
 
 
 def budget(

@@ -73,7 +73,7 @@ def control_signals(satellite: Satellite, t: Float[Array, ""], state: State) -> 
     reference = satellite.guidance.reference(t)
     error = attitude_error(reference.q_NR, state.q_NB)
     rotor, drive = state.rotor, satellite.cluster.drive
-    A, h_rms = torque_axes(satellite, state.gimbal_angle, rotor and rotor.speed)
+    A, h_rms = torque_axes(satellite, state.gimbal_angle, None if rotor is None else rotor.speed)
 
     rotor_acceleration = torque_share = None
     if rotor is not None:

@@ -55,7 +55,7 @@ def outputs(
     """
     signals = control_signals(satellite, t, state)
     motion = leg_motion(satellite.legs, plate_motion(state))
-    joints, rotors = None, (None, None, None)
+    joints, torque = None, None
     if with_joint_forces or state.rotor is not None:
         _, acceleration = evaluate(satellite, t, state, None, averaged)
         if with_joint_forces:
@@ -63,7 +63,6 @@ def outputs(
         if state.rotor is not None:
             shaken = satellite if averaged is None else balanced(satellite)
             torque = rotor_torques(shaken, state, signals, acceleration)
-            rotors = state.rotor.angle, state.rotor.speed, torque
     return Outputs(
         bus_position=state.p_NB_N,
         bus_velocity=state.v_NB_N,
@@ -81,9 +80,9 @@ def outputs(
         attitude_error=signals.attitude_error_B,
         singularity_measure=signals.singularity,
         joint_forces=joints,
-        rotor_angle=rotors[0],
-        rotor_speed=rotors[1],
-        rotor_torque=rotors[2],
+        rotor_angle=None if state.rotor is None else state.rotor.angle,
+        rotor_speed=None if state.rotor is None else state.rotor.speed,
+        rotor_torque=torque,
         torque_share=signals.torque_share,
     )
 

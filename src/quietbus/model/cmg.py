@@ -158,14 +158,14 @@ class ClusterMoments(eqx.Module):
             return fit(jnp.concatenate([c, H], axis=2))[:3, :3], fit(J), fit(H_gimbal)[:3]
 
         mass = jnp.sum(cluster.gimbal_mass + cluster.rotor_mass)
-        moments = [jnp.moveaxis(m, -1, 0) for m in eqx.filter_vmap(unit)(cluster)]
+        c_H, J, H_gimbal = (jnp.moveaxis(m, -1, 0) for m in eqx.filter_vmap(unit)(cluster))
         H_speed = None
         if cluster.drive is not None:
             at_one = eqx.tree_at(
                 lambda c: c.rotor_speed, cluster, jnp.ones_like(cluster.rotor_speed)
             )
             H_speed = jnp.moveaxis(eqx.filter_vmap(unit)(at_one)[0], -1, 0)[3:]
-        return cls(mass, cluster.rotor_speed, *moments, H_speed)
+        return cls(mass, cluster.rotor_speed, c_H, J, H_gimbal, H_speed)
 
     def turning(
         self, speed: Float[Array, " cmg"], acceleration: Float[Array, " cmg"]
@@ -216,7 +216,7 @@ class ClusterMoments(eqx.Module):
             + speed**2 * g[0] * f[2]
             + acceleration * g[1] * f[0]
         )
-        spin_up = 0.0
+        spin_up: Array | float = 0.0
         if self.rotor_acceleration is not None:
             assert self.H_speed is not None
             rotor_acceleration = self.rotor_acceleration[:, None, None]
@@ -256,7 +256,7 @@ class ClusterMoments(eqx.Module):
         b1 = spin * one + rate * first
         b2 = spin**2 * one + 2.0 * spin * rate * first + rate**2 * second + acceleration * first
         times = lambda row, k: jnp.einsum("jg,mjg->jm", row[:, : k.shape[2]], k)  # noqa: E731
-        spin_up = 0.0
+        spin_up: Array | float = 0.0
         if self.rotor_acceleration is not None:
             assert self.H_speed is not None
             rotor_acceleration = self.rotor_acceleration[:, None]

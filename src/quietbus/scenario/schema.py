@@ -12,9 +12,9 @@ import numpy as np
 from pydantic import BeforeValidator, ValidationError, model_validator
 
 from quietbus.scenario.base import Duration, Frequency, Part, PositiveNumber, Text, listing
+from quietbus.scenario.checks import listed
 from quietbus.scenario.control import Control, Initial, Load, NoSteering, PseudoInverse, Target
 from quietbus.scenario.errors import Findings, Path, Problem, ScenarioError, dotted, found
-from quietbus.scenario.checks import listed
 from quietbus.scenario.hardware import Bus, Cluster, Isolator
 from quietbus.scenario.text import read_yaml, write_yaml
 from quietbus.scenario.units import expected
@@ -206,7 +206,8 @@ class Scenario(Part):
 
 def _check_wheels(scenario: Scenario, findings: Findings) -> None:
     """Steering that wheels can follow."""
-    law, path = scenario.control and scenario.control.steering, ("control", "steering", "law")
+    path = ("control", "steering", "law")
+    law = None if scenario.control is None else scenario.control.steering
     if law is None or isinstance(law, NoSteering):
         return
     axes = np.array([wheel.spin_axis for wheel in scenario.cluster.placed()])
@@ -228,7 +229,8 @@ def _check_wheels(scenario: Scenario, findings: Findings) -> None:
 
 def _check_run_up(scenario: Scenario, findings: Findings) -> None:
     """A run-up that leaves the rest of the scenario its meaning."""
-    cluster, steering = scenario.cluster, scenario.control and scenario.control.steering
+    cluster = scenario.cluster
+    steering = None if scenario.control is None else scenario.control.steering
     if cluster.run_up is None:
         return
     if scenario.initial.steady:

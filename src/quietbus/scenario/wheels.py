@@ -103,7 +103,8 @@ class WheelCluster(Placed):
         nominal = tuple(wheel.rotor.speed for wheel in wheels if wheel.rotor)
         given = {"rotor": nominal}
         if self.run_up:
-            given = dict(zip(("initial_speed", "final_speed"), self.run_up.speeds(nominal)))
+            initial, final = self.run_up.speeds(nominal)
+            given = {"initial_speed": initial, "final_speed": final}
         for key, speeds in given.items():
             for j, (wheel, speed) in enumerate(zip(wheels, speeds, strict=True)):
                 limit = wheel.motor and wheel.motor.speed_limit

@@ -2,8 +2,8 @@
 
 Bus and plate are free bodies, or the plate is welded to the bus (``mount: rigid``). Each CMG is a
 gimbal body on a hinge in the plate and a rotor on a hinge in the gimbal body; a huge armature on
-these hinges prescribes their motion while the motor's reaction still acts. Reaction wheels have their
-housing, without a hinge, for the gimbal body. The legs are
+these hinges prescribes their motion while the motor's reaction still acts. Of reaction wheels the
+housing, without a hinge, is the gimbal body. The legs are
 
 - ``tendons``: massless struts between two points, exact for legs without mass and joint friction;
 - ``bodies``: trees on the bus, universal joint (hinge about the fixed axis k, hinge about the
