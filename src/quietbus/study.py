@@ -83,7 +83,7 @@ class Study:
             notes.append(f"The scenario {which}: no loop to analyse, those parts are empty.")
         elif self.satellite.steering is None:
             notes.append(
-                "The scenario holds the gimbals (steering: none), so that a run feels no control; "
+                "The scenario lets no unit act (steering: none), so that a run feels no control; "
                 "the loop is analysed as if the plate received the torque that is asked for."
             )
         if self.channels.largest_coupling > 0.0:
@@ -150,6 +150,11 @@ class Study:
         return controlled(self.linear(self._actuator), self.pid) if self.pid else None
 
     @property
+    def _ideal(self) -> str:
+        """Units that do at once what they are asked for."""
+        return "ideal wheels" if self.satellite.cluster.wheels else "ideal gimbals"
+
+    @property
     def _actuator(self) -> Actuator:
         return "ideal" if self.satellite.steering is None else "servo"
 
@@ -165,7 +170,7 @@ class Study:
             return None
         rows: list[dict[str, Any]] = [
             {
-                "case": f"per axis, {axis}: base fixed, massless legs, ideal gimbals",
+                "case": f"per axis, {axis}: base fixed, massless legs, {self._ideal}",
                 "stable_gain_range": analysis.stable_gain_range,
                 "gain_margins_db": analysis.gain_margins_db,
             }
@@ -186,9 +191,8 @@ class Study:
             case: analyze_coupled(controlled(linearize(satellite, self.point, "ideal"), self.pid))
             for case, satellite in steps.items()
         }
-        last = (
-            "with rotor momentum" if self.satellite.steering is None else "with gimbal servo: all"
-        )
+        by = "the wheels' motion" if self.satellite.cluster.wheels else "gimbal servo"
+        last = "with rotor momentum" if self.satellite.steering is None else f"with {by}: all"
         results[last] = self.coupled
         rows += [
             {

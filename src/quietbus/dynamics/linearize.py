@@ -12,7 +12,7 @@ bus axes at the operating point:
     plate_position    origin of P from the bus mass centre, deviation [m]
     plate_attitude    rotation vector of the plate [rad]
     bus_rate, plate_velocity (relative to the bus), plate_rate
-    gimbal_angle, gimbal_rate
+    gimbal_angle, gimbal_rate; of reaction wheels rotor_speed instead
     bus_velocity, bus_position
 """
 
@@ -31,6 +31,7 @@ from quietbus.dynamics.equations import Accelerations, Wrench, accelerations, pl
 from quietbus.dynamics.kinematics import leg_motion
 from quietbus.dynamics.state import State
 from quietbus.model.cmg import ClusterMoments, ControlMomentGyro
+from quietbus.model.rotor import RotorState, WheelMotors
 from quietbus.model.satellite import Satellite
 from quietbus.model.steering import PseudoInverse
 from quietbus.spatial.inertia import point_inertia
@@ -179,15 +180,17 @@ def linearize(
 
     Inputs (each with _x _y _z): ``bus_force``, ``bus_torque``, ``plate_force``, ``plate_torque``
     (about each body's origin), ``cmg<j>_force``, ``cmg<j>_torque`` at the rotor centres,
-    ``control_torque``; and ``gimbal_rate_command_<j>``. Outputs: the states, ``leg_stroke_<i>``,
+    ``control_torque``; and ``gimbal_rate_command_<j>``, of reaction wheels
+    ``rotor_torque_command_<j>``. Outputs: the states, ``leg_stroke_<i>``,
     ``leg_force_<i>``, ``bus_acceleration`` and ``<name>_acceleration`` of further points.
 
     Args:
         satellite: its controller and loads are left out; its steering law, at the operating point,
             turns ``control_torque`` into gimbal rate commands.
         point: gimbal angles and steady rate.
-        actuator: "servo": control torque by gimbal motion through the servo. "ideal": control
-            torque acts on the plate as it is asked for, gimbals held.
+        actuator: "servo": control torque by gimbal motion through the servo, or by the wheels.
+            "ideal": control torque acts on the plate as it is asked for, gimbals held and rotors
+            at constant speed.
         points: further points of the bus [m], bus frame, by name.
 
     Raises:
@@ -198,7 +201,8 @@ def linearize(
     at = OperatingPoint(jnp.asarray(point.rate, float), jnp.asarray(point.gimbal_angle, float))
     A, B, C, D = _at_equilibrium(satellite, at, further)
     n_cmg, n_leg = len(satellite.cluster.rotor_mass), len(satellite.legs.stiffness)
-    states, inputs, outputs = _names(n_cmg, n_leg, tuple(further))
+    wheels = satellite.cluster.wheels
+    states, inputs, outputs = _names(n_cmg, n_leg, tuple(further), wheels)
     torque, command = slice(-3 - n_cmg, -n_cmg), slice(-n_cmg, None)
     if actuator == "servo":
         steering = _steering(satellite, at)
@@ -209,27 +213,34 @@ def linearize(
         kept = [i for i, name in enumerate(states) if not name.startswith("plate_")]
         A, B, C = A[np.ix_(kept, kept)], B[kept], C[:, kept]
         states = tuple(states[i] for i in kept)
-    if actuator == "ideal":
-        kept = [i for i, name in enumerate(states) if not name.startswith("gimbal_")]
+    if wheels:  # nothing depends on the angles of rotors whose imbalance is averaged
+        kept = [i for i, name in enumerate(outputs) if not name.startswith("rotor_angle")]
+        C, D, outputs = C[kept], D[kept], tuple(outputs[i] for i in kept)
+    unmoved = ("gimbal_", "rotor_") if actuator == "ideal" else ("rotor_angle",)
+    if wheels or actuator == "ideal":
+        kept = [i for i, name in enumerate(states) if not name.startswith(unmoved)]
         A, B, C = A[np.ix_(kept, kept)], B[kept], C[:, kept]
         states = tuple(states[i] for i in kept)
     return LinearModel(A, B, C, D, states, inputs, outputs)
 
 
-def _names(n_cmg: int, n_leg: int, points: tuple[str, ...]):
+def _names(n_cmg: int, n_leg: int, points: tuple[str, ...], wheels: bool):
+    kinds, command = ("gimbal_angle", "gimbal_rate"), "gimbal_rate_command"
+    if wheels:
+        kinds, command = ("rotor_angle", "rotor_speed"), "rotor_torque_command"
     spread = lambda names: [f"{name}_{axis}" for name in names for axis in AXES]  # noqa: E731
-    gimbals = [f"{kind}_{j}" for kind in ("gimbal_angle", "gimbal_rate") for j in range(n_cmg)]
+    units = [f"{kind}_{j}" for kind in kinds for j in range(n_cmg)]
     states = (
         spread(["bus_attitude", "plate_position", "plate_attitude"])
         + spread(["bus_rate", "plate_velocity", "plate_rate"])
-        + gimbals
+        + units
         + spread(["bus_velocity", "bus_position"])
     )
     inputs = (
         spread(["bus_force", "bus_torque", "plate_force", "plate_torque"])
         + [f"cmg{j}_{kind}_{a}" for j in range(n_cmg) for kind in ("force", "torque") for a in AXES]
         + spread(["control_torque"])
-        + [f"gimbal_rate_command_{j}" for j in range(n_cmg)]
+        + [f"{command}_{j}" for j in range(n_cmg)]
     )
     legs = [f"{kind}_{i}" for kind in ("leg_stroke", "leg_force") for i in range(n_leg)]
     accelerated = spread(["bus_acceleration", *(f"{name}_acceleration" for name in points)])
@@ -237,11 +248,17 @@ def _names(n_cmg: int, n_leg: int, points: tuple[str, ...]):
 
 
 def _chart(satellite: Satellite, at: OperatingPoint, x: Float[Array, " x"]) -> State:
-    """The state at deviation x, in the frame that turns with the satellite."""
+    """The state at deviation x, in the frame that turns with the satellite.
+
+    Wheels have their angles and speeds where CMGs have those of the gimbals.
+    """
     n = len(satellite.cluster.rotor_mass)
     cuts = np.cumsum([3, 3, 3, 3, 3, 3, n, n, 3])
     theta_B, r, theta_P, w_B, v_rel, w_P, gamma, gamma_rate, v_B, p_B = jnp.split(x, cuts)
-    rate = at.rate
+    rate, rotor = at.rate, None
+    if satellite.cluster.wheels:
+        rotor = RotorState(gamma, satellite.cluster.rotor_speed + gamma_rate)
+        gamma = gamma_rate = jnp.zeros(n)
     q_B, q_P = rotation_vector_to_quaternion(theta_B), rotation_vector_to_quaternion(theta_P)
     q_P = quaternion_multiply(q_P, satellite.q_BP)
     r = satellite.p_BP_B + r
@@ -264,6 +281,7 @@ def _chart(satellite: Satellite, at: OperatingPoint, x: Float[Array, " x"]) -> S
         gimbal_angle=jnp.asarray(at.gimbal_angle + gamma),
         gimbal_rate=gamma_rate,
         error_integral=jnp.zeros(3),
+        rotor=rotor,
     )
 
 
@@ -295,9 +313,13 @@ def _rates_and_outputs(
         force_B=R_B @ bus_force,
         torque_B=R_B @ bus_torque,
     )
-    gimbal_acceleration = satellite.servo.bandwidth * (command - state.gimbal_rate)
     phi = jnp.zeros(n)  # of no effect: the moments are averaged over it
-    a = accelerations(satellite, state, phi, gimbal_acceleration, wrench, moments)
+    moved = unit_acceleration = satellite.servo.bandwidth * (command - state.gimbal_rate)
+    spin_up, unit_rate = None, state.gimbal_rate
+    if state.rotor is not None:
+        spin_up = unit_acceleration = command / satellite.cluster.I_RRcm_R[:, 0, 0]
+        moved, unit_rate = jnp.zeros(n), state.rotor.speed - satellite.cluster.rotor_speed
+    a = accelerations(satellite, state, phi, moved, wrench, moments, spin_up)
 
     v_rel = plates.v_P - plates.v_B
     turning = v_rel - jnp.cross(rate, plates.p_BP)  # of P about B, seen in the turning frame
@@ -310,8 +332,8 @@ def _rates_and_outputs(
             R_B.T @ a.w_B,
             a.v_P - a.v_B - jnp.cross(rate, v_rel) - jnp.cross(rate, turning),
             a.w_P - jnp.cross(rate, plates.w_P),
-            state.gimbal_rate,
-            gimbal_acceleration,
+            unit_rate,
+            unit_acceleration,
             a.v_B - jnp.cross(rate, plates.v_B) - jnp.cross(rate, bus_speed),
             bus_speed,
         ]
@@ -324,6 +346,10 @@ def _outputs(satellite, at, state, a: Accelerations, points, turning, bus_speed)
     legs = leg_motion(satellite.legs, plates)
     R_B, w_B = plates.R_NB, plates.w_B
     q_tilt = quaternion_multiply(state.q_NP, quaternion_conjugate(satellite.q_BP))
+    unit_angle, unit_rate = state.gimbal_angle - at.gimbal_angle, state.gimbal_rate
+    if state.rotor is not None:
+        unit_angle = state.rotor.angle
+        unit_rate = state.rotor.speed - satellite.cluster.rotor_speed
     arms = [jnp.zeros(3), *(R_B @ p for p in points.values())]
     return jnp.concatenate(
         [
@@ -333,8 +359,8 @@ def _outputs(satellite, at, state, a: Accelerations, points, turning, bus_speed)
             state.w_NB_B - at.rate,
             turning,
             plates.w_P - at.rate,
-            state.gimbal_angle - at.gimbal_angle,
-            state.gimbal_rate,
+            unit_angle,
+            unit_rate,
             bus_speed,
             state.p_NB_N,
             legs.length - satellite.legs.nominal_length,
@@ -416,7 +442,7 @@ def _derivatives(satellite, at, points):
 
 
 def _steering(satellite: Satellite, at: OperatingPoint) -> np.ndarray:
-    """Gimbal rate commands (cmg, 3) by control torque, bus axes."""
+    """Gimbal rate or rotor torque commands (cmg, 3) by control torque, bus axes."""
     commands = np.asarray(_steering_matrix(satellite, at.gimbal_angle))
     if not np.all(np.abs(commands) < SINGULAR):
         raise OperatingPointError(
@@ -435,7 +461,11 @@ def _steering_matrix(satellite, gimbal_angle):
     axes, h_rms = torque_axes(satellite, gimbal_angle)
     law = satellite.steering or PseudoInverse()
     wanted = -quaternion_to_matrix(satellite.q_BP) / h_rms  # a row for each axis of the torque
-    return jax.vmap(lambda w: law.rates(axes, w, jnp.zeros(())))(wanted).T
+    commands = jax.vmap(lambda w: law.rates(axes, w, jnp.zeros(())))(wanted).T
+    drive = satellite.cluster.drive
+    if isinstance(drive, WheelMotors):
+        return commands * jnp.broadcast_to(drive.weights, len(commands))[:, None]
+    return commands
 
 
 def _check_equilibrium(bus: np.ndarray, plate: np.ndarray) -> None:
