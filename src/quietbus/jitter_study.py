@@ -72,7 +72,8 @@ class JitterStudy:
                     "--method harmonic`"
                 )
             modes = np.linalg.eigvals(small.state_matrix())
-            refuse_resonance(self.satellite(mount), f"with mount {mount}", modes)
+            speeds = np.asarray(self.satellite(mount).cluster.rotor_speed)
+            refuse_resonance(speeds, f"with mount {mount}", modes)
 
     def satellite(self, mount: str) -> Satellite:
         """Parameters of the model."""

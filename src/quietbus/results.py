@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.interpolate import make_interp_spline
+from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 
 from quietbus.analysis.jitter import combine
 from quietbus.analysis.residual import residual, shows
+from quietbus.dynamics.outputs import Outputs
 from quietbus.model.cmg import ORDERS
 from quietbus.scenario import Scenario
 from quietbus.scenario.wheels import WheelCluster
@@ -133,7 +134,7 @@ def to_dataset(
             for name, description in JOINT_VARIABLES.items()
         }
     if jitter is not None:
-        data |= _jitter_variables(scenario, jitter)
+        data |= _jitter_variables(*_rotor_lines(scenario, solution.outputs), jitter)
     counted = {"cmg": solution.outputs.gimbal_angle, "leg": solution.outputs.leg_stroke}
     coordinates = {
         "time": ("time", solution.time, {"units": "s", "long_name": "time"}),
@@ -174,10 +175,16 @@ def to_dataset(
     return xr.Dataset(data, coordinates, attributes)
 
 
-def _jitter_variables(scenario: Scenario, jitter: Jitter) -> dict[str, Any]:
-    """Amplitudes, phases and what combines them, of every output that has components."""
+def _rotor_lines(scenario: Scenario, outputs: Outputs) -> tuple[np.ndarray, np.ndarray]:
+    """Frequency and phase of each order (..., cmg, order), over time where speeds change."""
     speed, phase = _rotors(scenario)
-    frequency, angle = np.outer(speed, ORDERS), np.outer(phase, ORDERS)
+    if outputs.rotor_speed is not None:
+        speed, phase = np.asarray(outputs.rotor_speed), np.asarray(outputs.rotor_angle)
+    return speed[..., None] * np.array(ORDERS), phase[..., None] * np.array(ORDERS)
+
+
+def _jitter_variables(frequency: np.ndarray, angle: np.ndarray, jitter: Jitter) -> dict[str, Any]:
+    """Amplitudes, phases and what combines them, of every output that has components."""
     data = {
         "jitter_change_error": _variable(
             jitter.change_error, (), "1", "estimated error of the jitter by the motion's change"
@@ -248,13 +255,21 @@ def reconstruct(
             f"{time[-1]:g} s; got {span:g} s around {around:g} s"
         )
     speed, phase = _rotors(scenario_of(run))
+    if "rotor_speed" in run:
+        speed = run["rotor_speed"].to_numpy()
     fastest = max(ORDERS) * np.max(np.abs(speed)) / (2.0 * np.pi)
     rate = rate or 40.0 * max(fastest, 1.0)
     first, last = max(time[0], around - span / 2), min(time[-1], around + span / 2)
     t = first + np.arange(int((last - first) * rate) + 1) / rate
     amplitude, shift = (run[f"{name}_jitter_{part}"] for part in ("amplitude", "phase"))
     at = _interpolated(time, amplitude.to_numpy() * np.exp(1j * shift.to_numpy()), t)
-    turn = np.exp(1j * (phase + np.outer(t, speed))[..., None] * np.array(ORDERS))
+    if "rotor_speed" not in run:
+        angle = phase + np.outer(t, speed)
+    elif len(time) == 1:
+        angle = run["rotor_angle"].to_numpy() + (t - time)[:, None] * speed
+    else:
+        angle = CubicHermiteSpline(time, run["rotor_angle"].to_numpy(), speed)(t)
+    turn = np.exp(1j * angle[..., None] * np.array(ORDERS))
     inner = amplitude.dims[3:]
     values = np.sum((at * turn.reshape(*turn.shape, *[1] * len(inner))).real, axis=(1, 2))
     meaning = f"jitter of {JITTER_VARIABLES[name][2]}"

@@ -68,9 +68,10 @@ def test_wheels_answer_a_control_torque_with_its_opposite(satellite, model):
     axes = np.asarray(satellite.cluster.R_PG0[:, :, 0])
     R_BP = rotation(satellite.q_BP).as_matrix()
     rows = [model.states.index(f"rotor_speed_{j}") for j in range(4)]
-    torque = np.asarray(satellite.cluster.I_RRcm_R[:, 0, 0])[:, None] * model.select(
-        ["control_torque"]
-    ).B[rows]
+    torque = (
+        np.asarray(satellite.cluster.I_RRcm_R[:, 0, 0])[:, None]
+        * model.select(["control_torque"]).B[rows]
+    )
     np.testing.assert_allclose(R_BP @ axes.T @ torque, -np.eye(3), atol=1e-9)
     limits = np.array([0.1, 0.2, 0.3, 0.4])
     weighted = limits[:, None] * np.linalg.pinv(axes.T * limits) @ -R_BP.T

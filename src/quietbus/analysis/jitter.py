@@ -50,8 +50,9 @@ def combine(amplitude: np.ndarray, frequency: np.ndarray, phase: np.ndarray) -> 
 
     Args:
         amplitude: (..., cmg, order, component) complex; the line is Re(amplitude exp(i angle)).
-        frequency: (cmg, order) d(angle)/dt [rad/s], of either sign.
-        phase: (cmg, order) angle at t = 0 [rad].
+        frequency: (cmg, order) d(angle)/dt [rad/s], of either sign; with the leading axes of
+            ``amplitude`` where it changes: lines that always agree in it are one line then.
+        phase: (cmg, order) angle at t = 0 [rad], or likewise the angle.
     """
     amplitude, frequency = np.asarray(amplitude), np.asarray(frequency)
     size = np.abs(amplitude)
@@ -68,6 +69,8 @@ def combine(amplitude: np.ndarray, frequency: np.ndarray, phase: np.ndarray) -> 
 
 def _groups(frequency: np.ndarray) -> list[np.ndarray]:
     """Masks (cmg, order) of lines of one frequency."""
+    if frequency.ndim > 2:
+        return _groups_of_changing(frequency)
     ascending = np.unique(frequency)
     new = np.diff(ascending, prepend=-np.inf) > SAME_FREQUENCY * ascending
     new[0] = True
@@ -76,22 +79,39 @@ def _groups(frequency: np.ndarray) -> list[np.ndarray]:
     return [member == i for i in range(len(starts))]
 
 
+def _groups_of_changing(frequency: np.ndarray) -> list[np.ndarray]:
+    """The same of frequencies (..., cmg, order)."""
+    shape = frequency.shape[-2:]
+    lines = frequency.reshape(-1, np.prod(shape)).T
+    left, masks = set(range(len(lines))), []
+    while left:
+        first = lines[min(left)]
+        apart = SAME_FREQUENCY * np.max(first)
+        alike = {i for i in left if np.max(np.abs(lines[i] - first)) <= apart}
+        masks.append(np.isin(np.arange(len(lines)), list(alike)).reshape(shape))
+        left -= alike
+    return masks
+
+
 def steady_jitter(
     satellite: Satellite, gimbal_angle: Float[Array, " cmg"]
 ) -> tuple[dict[str, Complex[Array, "cmg order ..."]], Vibration]:
     """Amplitudes of the outputs (``dynamics.vibration.linear_outputs``) with the satellite at rest.
 
-    The satellite is at its target, its plate in the nominal pose, no load acts; ``rest_error``
-    tells whether that is an equilibrium. Also the equations that the amplitudes solve.
+    The satellite is at its target, its plate in the nominal pose, rotors at their nominal speeds,
+    no load acts; ``rest_error`` tells whether that is an equilibrium. Also the equations that the
+    amplitudes solve.
     """
     unit = jnp.array([1.0, 0.0, 0.0, 0.0])
     satellite = replace(satellite, guidance=StepGuidance(unit), loads=())
     state = initial_state(satellite, unit, jnp.zeros(3), gimbal_angle)
+    if satellite.cluster.run_up is not None:
+        state = replace(state, rotor=None)  # at the nominal speed
     moments = ClusterMoments.expand(satellite.cluster)
     slow = slow_motion(satellite, jnp.zeros(()), state, moments.averaged())
     small = vibration(satellite, slow, moments, leg_coefficients(satellite, slow))
     xi = rotor_response(small, moments)
-    s = 1j * moments.rotor_speed[:, None] * jnp.array(ORDERS)
+    s = 1j * slow.rotor_speed[:, None] * jnp.array(ORDERS)
     outputs = jax.vmap(jax.vmap(lambda s, x: linear_outputs(satellite, small, s, x, NOTHING_SEEN)))
     return outputs(s, xi), small
 

@@ -20,7 +20,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Complex, Float
 
-from quietbus.dynamics.closed_loop import control_signals, evaluate, external_wrench
+from quietbus.dynamics.closed_loop import (
+    ControlSignals,
+    control_signals,
+    evaluate,
+    external_wrench,
+)
 from quietbus.dynamics.equations import (
     body_force,
     body_mass_matrix,
@@ -45,6 +50,27 @@ class SlowMotion(eqx.Module):
     plates: PlateMotion  # along bus axes, so that R_NB is the unit matrix
     u_rate: Float[Array, "12"]  # accelerations (dv_P, dw_P, dv_B, dw_B)
     gimbal: tuple[Float[Array, " cmg"], ...]  # angle [rad], rate and acceleration
+    rotor_speed: Float[Array, " cmg"]  # [rad/s]
+    rotor_acceleration: Float[Array, " cmg"] | None  # [rad/s^2]; None: constant speed
+
+    def turning(self, moments: ClusterMoments) -> ClusterMoments:
+        """The cluster's moments at the rotors' speeds of this instant."""
+        if self.rotor_acceleration is None:
+            return moments
+        return moments.turning(self.rotor_speed, self.rotor_acceleration)
+
+
+def rotor_speeds(satellite: Satellite, state: State) -> Float[Array, " cmg"]:
+    """Rotor speeds [rad/s], those of the state where they change."""
+    return satellite.cluster.rotor_speed if state.rotor is None else state.rotor.speed
+
+
+def unit_acceleration(satellite: Satellite, signals: ControlSignals) -> Float[Array, " cmg"]:
+    """What the control makes the units do [rad/s^2]: of their gimbals, or of the wheels."""
+    if not satellite.cluster.wheels:
+        return signals.gimbal_acceleration
+    assert signals.rotor_acceleration is not None
+    return signals.rotor_acceleration
 
 
 def slow_motion(
@@ -57,7 +83,8 @@ def slow_motion(
     along_bus = PlateMotion(jnp.eye(3), R_BN @ plates.R_NP, *(rotate(R_BN, v) for v in vectors))
     u_rate = jnp.stack([a.v_P, a.w_P, a.v_B, a.w_B])
     gimbal = (state.gimbal_angle, state.gimbal_rate, signals.gimbal_acceleration)
-    return SlowMotion(t, state, along_bus, rotate(R_BN, u_rate).reshape(12), gimbal)
+    rotor = rotor_speeds(satellite, state), signals.rotor_acceleration
+    return SlowMotion(t, state, along_bus, rotate(R_BN, u_rate).reshape(12), gimbal, *rotor)
 
 
 class Coefficients(eqx.Module):
@@ -90,6 +117,7 @@ def body_coefficients(
     satellite: Satellite, slow: SlowMotion, averaged: ClusterMoments
 ) -> Coefficients:
     """What plate, cluster, bus and external loads contribute."""
+    averaged = slow.turning(averaged)
     carried = averaged.at(slow.gimbal[0], jnp.zeros_like(slow.gimbal[0]), *slow.gimbal[1:])
     R_NB = quaternion_to_matrix(slow.state.q_NB)
 
@@ -132,7 +160,10 @@ def _derivatives(force, plates, ways):
 
 
 class Control(eqx.Module):
-    """How the gimbals answer the bus: ``d(gimbal acceleration, rate of the integral)``."""
+    """How the gimbals answer the bus: ``d(gimbal acceleration, rate of the integral)``.
+
+    Reaction wheels have their rotors' angles where CMGs have those of their gimbals.
+    """
 
     by_attitude: Float[Array, "cmg+3 3"]  # theta_B
     by_rate: Float[Array, "cmg+3 3"]  # w_NB_B
@@ -253,37 +284,61 @@ def _control(satellite, slow, moments):
         return None
     state, n = slow.state, len(slow.gimbal[0])
 
-    def decide(theta, rate, integral, gamma, gamma_rate):
+    wheels = satellite.cluster.wheels
+
+    def decide(theta, rate, integral, angle, angle_rate):
         small = jnp.concatenate([jnp.ones(1), 0.5 * theta])
         moved = eqx.tree_at(
-            lambda s: (s.q_NB, s.w_NB_B, s.error_integral, s.gimbal_angle, s.gimbal_rate),
-            state,
+            lambda s: (s.q_NB, s.w_NB_B, s.error_integral),
+            with_units_moved(satellite, state, angle, angle_rate),
             (
                 quaternion_multiply(state.q_NB, small),
                 state.w_NB_B + rate,
                 state.error_integral + integral,
-                state.gimbal_angle + gamma,
-                state.gimbal_rate + gamma_rate,
             ),
         )
         signals = control_signals(satellite, slow.t, moved)
-        return jnp.concatenate([signals.gimbal_acceleration, signals.integral_rate])
+        return jnp.concatenate([unit_acceleration(satellite, signals), signals.integral_rate])
 
-    def reaction(gimbal):
+    def reaction(unit):
         push = jax.vmap(plate_force, (None, 0, None))
-        return push(slow.plates, moments.order(0, *gimbal), slow.u_rate[:6])
+        if wheels:
+            mean = moments.turning(*unit[1:]).order(0, *slow.gimbal)
+        else:
+            mean = slow.turning(moments).order(0, *unit)
+        return push(slow.plates, mean, slow.u_rate[:6])
+
+    unit = slow.gimbal
+    if wheels:
+        assert state.rotor is not None
+        unit = (state.rotor.angle, slow.rotor_speed, slow.rotor_acceleration)
 
     nothing = (jnp.zeros(3), jnp.zeros(3), jnp.zeros(3), jnp.zeros(n), jnp.zeros(n))
     # each unit's reaction is its own: one derivative for all units at once
     ways = [tuple(jnp.full(n, float(i == k)) for i in range(3)) for k in range(3)]
-    reactions = jnp.stack([jax.jvp(reaction, (slow.gimbal,), (way,))[1].T for way in ways])
+    reactions = jnp.stack([jax.jvp(reaction, (unit,), (way,))[1].T for way in ways])
     by = jax.jacfwd(decide, argnums=tuple(range(5)))(*nothing)
     return Control(by[0], by[1], by[2], by[3], by[4], jnp.pad(reactions, ((0, 0), (0, 6), (0, 0))))
 
 
+def with_units_moved(
+    satellite: Satellite,
+    state: State,
+    angle: Float[Array, " cmg"],
+    angle_rate: Float[Array, " cmg"],
+) -> State:
+    """The state with gimbals, or wheels, at other angles and rates by these [rad], [rad/s]."""
+    if satellite.cluster.wheels:
+        where = lambda s: (s.rotor.angle, s.rotor.speed)  # noqa: E731
+    else:
+        where = lambda s: (s.gimbal_angle, s.gimbal_rate)  # noqa: E731
+    old_angle, old_rate = where(state)
+    return eqx.tree_at(where, state, (old_angle + angle, old_rate + angle_rate))
+
+
 def rotor_forces(slow: SlowMotion, moments: ClusterMoments) -> Complex[Array, "order cmg 12"]:
     """Amplitudes of the forces on (v_P, w_P, v_B, w_B) at each order of each rotor."""
-    push = jax.vmap(plate_force, (None, 0, None))
+    push, moments = jax.vmap(plate_force, (None, 0, None)), slow.turning(moments)
     on_plate = [push(slow.plates, moments.order(h, *slow.gimbal), slow.u_rate[:6]) for h in ORDERS]
     return jnp.pad(jnp.stack(on_plate), ((0, 0), (0, 0), (0, 6)))
 
@@ -306,10 +361,10 @@ def rotor_response(
     forces, h = rotor_forces(small.slow, moments), jnp.array(ORDERS)
     if one_speed:
         columns = jnp.swapaxes(forces, 1, 2)
-        xi = jax.vmap(respond, (0, None, 0))(h, moments.rotor_speed[0], columns)
+        xi = jax.vmap(respond, (0, None, 0))(h, small.slow.rotor_speed[0], columns)
         return jnp.moveaxis(xi, 2, 0)
     each = jax.vmap(jax.vmap(respond, (None, 0, 0)), (0, None, 0))
-    return jnp.swapaxes(each(h, moments.rotor_speed, forces[..., None])[..., 0], 0, 1)
+    return jnp.swapaxes(each(h, small.slow.rotor_speed, forces[..., None])[..., 0], 0, 1)
 
 
 class View(eqx.Module):

@@ -18,7 +18,7 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 from scipy.spatial.transform import Rotation
 
-from quietbus.dynamics.closed_loop import evaluate
+from quietbus.dynamics.closed_loop import evaluate, rotor_angles
 from quietbus.dynamics.state import State
 from quietbus.dynamics.vibration import (
     NOTHING_SEEN,
@@ -27,8 +27,11 @@ from quietbus.dynamics.vibration import (
     leg_coefficients,
     linear_outputs,
     rotor_response,
+    rotor_speeds,
     slow_motion,
+    unit_acceleration,
     vibration,
+    with_units_moved,
 )
 from quietbus.model.cmg import ORDERS, ClusterMoments
 from quietbus.model.satellite import Satellite
@@ -58,7 +61,7 @@ class Jitter:
     """Steady response to each order of each rotor along a motion.
 
     A deviation is ``Re(sum amplitude * exp(1j * h * phi))`` over rotors and orders, where
-    ``phi = rotor_phase + rotor_speed * t``.
+    ``phi = rotor_phase + rotor_speed * t``, or the slow motion's rotor angle where speeds change.
     """
 
     amplitudes: dict[str, np.ndarray]  # (n, cmg, order, ...) by output, complex
@@ -139,14 +142,15 @@ def on_periodic_solution(satellite: Satellite, state: State) -> State:
     rotor speed, which move the satellite too (docs/theory.md, section 14).
     """
     small, xi = _jitter_at(satellite, state)
-    first = _motions(satellite, small, xi, satellite.cluster.rotor_phase)
+    speed, phase = _rotors(satellite, state)
+    first = _motions(small, xi, phase)
     second = [np.zeros_like(part) for part in first]
-    speeds = np.abs(np.asarray(satellite.cluster.rotor_speed))
-    for speed in np.unique(speeds[speeds > 0.0]):
-        square = _jitter_squared(satellite, state, small, xi, speeds == speed)
-        for part, moved in zip(second, _answer_to_square(small, square, speed), strict=True):
+    speeds = np.abs(np.asarray(speed))
+    for one in np.unique(speeds[speeds > 0.0]):
+        square = _jitter_squared(satellite, state, small, xi, speeds == one)
+        for part, moved in zip(second, _answer_to_square(small, square, one), strict=True):
             part += moved
-    return _displaced(state, *map(np.add, first, second))
+    return _displaced(satellite, state, *map(np.add, first, second))
 
 
 def _answer_to_square(small: Vibration, square: Sequence[np.ndarray], speed: float):
@@ -189,7 +193,13 @@ def without_jitter(satellite: Satellite, state: State) -> State:
 
 @eqx.filter_jit
 def _moved_by(satellite, state, small, xi):
-    return _displaced(state, *_motions(satellite, small, xi, satellite.cluster.rotor_phase))
+    motions = _motions(small, xi, _rotors(satellite, state)[1])
+    return _displaced(satellite, state, *motions)
+
+
+def _rotors(satellite, state):
+    """Speeds [rad/s] and angles [rad] of the rotors at t = 0."""
+    return rotor_speeds(satellite, state), rotor_angles(satellite, jnp.zeros(()), state)
 
 
 def _jitter_at(satellite: Satellite, state: State) -> tuple[Vibration, np.ndarray]:
@@ -197,12 +207,13 @@ def _jitter_at(satellite: Satellite, state: State) -> tuple[Vibration, np.ndarra
     states = jax.tree.map(lambda leaf: np.asarray(leaf)[None], state)
     _, xi, small = _Along(satellite, np.zeros(1), states).chunk(np.zeros(1, int), NOTHING_SEEN)
     small = jax.tree.map(lambda leaf: leaf[0], small)
-    refuse_resonance(satellite, "at t = 0 s", np.linalg.eigvals(small.state_matrix()))
+    modes = np.linalg.eigvals(small.state_matrix())
+    refuse_resonance(np.asarray(small.slow.rotor_speed), "at t = 0 s", modes)
     return small, xi[0]
 
 
 @eqx.filter_jit
-def _motions(satellite, small, xi, phase):
+def _motions(small, xi, phase):
     """Pose, its rate, gimbal angles, their rates and integral of jitter xi at rotor angles."""
     n = len(phase)
 
@@ -216,7 +227,7 @@ def _motions(satellite, small, xi, phase):
 
     over_orders = jax.vmap(one, (0, None, None, 0))
     moved = jax.vmap(over_orders, (None, 0, 0, 0))(
-        jnp.array(ORDERS), satellite.cluster.rotor_speed, phase, xi
+        jnp.array(ORDERS), small.slow.rotor_speed, phase, xi
     )
     return tuple(jnp.sum(part.real, axis=(0, 1)) for part in moved)
 
@@ -230,7 +241,7 @@ def _jitter_squared(satellite, state, small, xi, same):
     """
     moments = ClusterMoments.expand(satellite.cluster)
     averaged = moments.averaged()
-    speed, phase = satellite.cluster.rotor_speed, satellite.cluster.rotor_phase
+    speed, phase = _rotors(satellite, state)
     R_BN = quaternion_to_matrix(state.q_NB).T
     chosen = lambda all_: all_.at[..., 1:].multiply(same[:, None, None])  # noqa: E731
     kinds = lambda m: (m.c_H, m.J, m.H_gimbal)  # noqa: E731
@@ -244,17 +255,17 @@ def _jitter_squared(satellite, state, small, xi, same):
     def rates(state, phi, moments):
         signals, a = evaluate(satellite, jnp.zeros(()), state, phi, moments)
         u_rate = jnp.stack([a.v_P, a.w_P, a.v_B, a.w_B]) @ R_BN.T
-        return u_rate.reshape(12), signals.gimbal_acceleration, signals.integral_rate
+        return u_rate.reshape(12), unit_acceleration(satellite, signals), signals.integral_rate
 
     def beyond(turn):
         phi = phase + turn * jnp.sign(speed)
-        now = _motions(satellite, small, xi, phi)
-        true = rates(_displaced(state, *now), phi, shaking)
+        now = _motions(small, xi, phi)
+        true = rates(_displaced(satellite, state, *now), phi, shaking)
         still = rates(state, phi, averaged)
         # first order: time derivatives of the motion
         turned = jnp.exp(1j * phi[:, None] * jnp.array(ORDERS))[..., None]
         accelerations = jnp.sum((xi_second * turned).real, axis=(0, 1))
-        changing = _motions(satellite, small, xi * s[..., None], phi)
+        changing = _motions(small, xi * s[..., None], phi)
         known = (accelerations, changing[3], changing[4])
         return tuple(t - still_ - k for t, still_, k in zip(true, still, known, strict=True))
 
@@ -264,7 +275,9 @@ def _jitter_squared(satellite, state, small, xi, same):
 TURNS = 16  # angles over which products of orders up to 2 are averaged
 
 
-def _displaced(state: State, pose, pose_rate, angle, angle_rate, integral) -> State:
+def _displaced(
+    satellite: Satellite, state: State, pose, pose_rate, angle, angle_rate, integral
+) -> State:
     """The state moved by small (r_P, theta_P, r_B, theta_B) along bus axes and by the others."""
     R_NB, R_NP = quaternion_to_matrix(state.q_NB), quaternion_to_matrix(state.q_NP)
     r_P, theta_P, r_B, theta_B = pose.reshape(4, 3) @ R_NB.T
@@ -277,7 +290,9 @@ def _displaced(state: State, pose, pose_rate, angle, angle_rate, integral) -> St
         """Body axes turn with theta, so that to second order half a vector product comes off."""
         return R.T @ (theta_rate - 0.5 * cross(theta, theta_rate))
 
-    return State(
+    moved = with_units_moved(satellite, state, angle, angle_rate)
+    return replace(
+        moved,
         p_NB_N=state.p_NB_N + r_B,
         q_NB=turned(state.q_NB, R_NB, theta_B),
         p_NP_N=state.p_NP_N + r_P,
@@ -286,8 +301,6 @@ def _displaced(state: State, pose, pose_rate, angle, angle_rate, integral) -> St
         w_NB_B=state.w_NB_B + rate(R_NB, theta_B, w_B),
         v_NP_N=state.v_NP_N + v_P,
         w_NP_P=state.w_NP_P + rate(R_NP, theta_P, w_P),
-        gimbal_angle=state.gimbal_angle + angle,
-        gimbal_rate=state.gimbal_rate + angle_rate,
         error_integral=state.error_integral + integral,
     )
 
@@ -308,6 +321,8 @@ def respond(
     along = _Along(satellite, time, states)
     amplitudes: dict[str, np.ndarray] = {}
     looks = np.unique(np.linspace(0, len(time) - 1, LOOKS).astype(int))
+    speeds = np.asarray(rotor_speeds(satellite, states))
+    speeds = np.broadcast_to(speeds, (len(time), speeds.shape[-1]))
     modes: dict[int, np.ndarray] = {}
     done = 0
     try:
@@ -328,9 +343,9 @@ def respond(
             raise
     amplitudes = {name: value[:done] for name, value in amplitudes.items()}
     for look, eigenvalues in modes.items():
-        refuse_resonance(satellite, f"at t = {time[look]:g} s", eigenvalues)
-    rates = np.abs(np.asarray(states.gimbal_rate))[:done]
-    error = _change_error(satellite, time[:done], amplitudes["bus_rate"], rates, modes)
+        refuse_resonance(speeds[look], f"at t = {time[look]:g} s", eigenvalues)
+    states = jax.tree.map(lambda leaf: np.asarray(leaf)[:done], states)
+    error = _change_error(time[:done], amplitudes["bus_rate"], states, speeds[:done], modes)
     said = []
     if error.size and np.max(error) > SLOW_CHANGE:
         worst = int(np.argmax(error))
@@ -354,7 +369,8 @@ class _Along:
 
     def __init__(self, satellite: Satellite, time: np.ndarray, states: State):
         self.satellite, self.time, self.states = satellite, time, states
-        self.one_speed = len(np.unique(np.asarray(satellite.cluster.rotor_speed))) == 1
+        speeds = np.unique(np.asarray(satellite.cluster.rotor_speed))
+        self.one_speed = states.rotor is None and len(speeds) == 1
         self._sample_legs()
 
     def chunk(self, instants: np.ndarray, view: View) -> Chunk:
@@ -395,11 +411,11 @@ class _Along:
 def _configuration(satellite: Satellite, states: State) -> np.ndarray:
     """What the legs' equations depend on (n, 12): pose of the plate in the bus, and rates.
 
-    In shares of a metre, a radian, and of the slowest rotor's speed.
+    In shares of a metre, a radian, and of the slowest rotor's speed (of at least 10 rad/s).
     """
     bus, plate = (Rotation.from_quat(np.roll(q, -1, axis=1)) for q in (states.q_NB, states.q_NP))
-    speeds = np.abs(np.asarray(satellite.cluster.rotor_speed))
-    slowest = np.min(speeds[speeds > 0.0], initial=1e3)
+    speeds = np.abs(np.asarray(rotor_speeds(satellite, states)))
+    slowest = max(np.min(speeds[speeds > 0.0], initial=1e3), 10.0)
     return np.concatenate(
         [
             bus.inv().apply(states.p_NP_N - states.p_NB_N),
@@ -453,7 +469,6 @@ def _compiled_legs(satellite, t, states):
 def _compiled_chunk(satellite, t, states, legs, view, one_speed):
     moments = ClusterMoments.expand(satellite.cluster)
     averaged = moments.averaged()
-    s = 1j * moments.rotor_speed[:, None] * jnp.array(ORDERS)
 
     def one(t, state, row):
         slow = slow_motion(satellite, t, state, averaged)
@@ -461,6 +476,7 @@ def _compiled_chunk(satellite, t, states, legs, view, one_speed):
         _, unravel = ravel_pytree(jax.tree.map(lambda leaf: jnp.zeros(leaf.shape), example))
         small = vibration(satellite, slow, moments, unravel(row))
         xi = rotor_response(small, moments, one_speed)
+        s = 1j * slow.rotor_speed[:, None] * jnp.array(ORDERS)
         views = jax.vmap(jax.vmap(lambda s, x: linear_outputs(satellite, small, s, x, view)))
         return views(s, xi), xi, small
 
@@ -476,14 +492,15 @@ def _eigenvalues(small: Vibration, start: int, looks: np.ndarray) -> dict[int, n
     return dict(zip(looks.tolist(), np.linalg.eigvals(matrices), strict=True))
 
 
-def refuse_resonance(satellite: Satellite, where: str, eigenvalues: np.ndarray) -> None:
+def refuse_resonance(speeds: np.ndarray, where: str, eigenvalues: np.ndarray) -> None:
     """Raise ResonanceError if an order of a rotor lies on an undamped mode.
 
     Args:
+        speeds: of the rotors [rad/s].
         where: which operating point, for the message.
         eigenvalues: of the controlled satellite [rad/s].
     """
-    for j, speed in enumerate(np.asarray(satellite.cluster.rotor_speed)):
+    for j, speed in enumerate(np.asarray(speeds)):
         for h in ORDERS:
             distance = np.min(np.abs(1j * h * speed - eigenvalues))
             if speed != 0.0 and distance < ON_A_MODE * abs(h * speed):
@@ -494,24 +511,35 @@ def refuse_resonance(satellite: Satellite, where: str, eigenvalues: np.ndarray) 
                 )
 
 
-def _change_error(satellite, time, bus_rate, gimbal_rates, modes) -> np.ndarray:
+def _change_error(time, bus_rate, states, speeds, modes) -> np.ndarray:
     """Estimated relative error of the jitter's quasi-steady amplitude (n,).
 
     An amplitude that changes at the rate a lags behind by ``a / |i h Omega - lambda|``, lambda the
-    nearest eigenvalue (docs/theory.md, section 14). a is the larger of the gimbal's rate and what
-    the amplitudes show from instant to instant.
+    nearest eigenvalue (docs/theory.md, section 14). a is the largest of the gimbal's rate, of what
+    the amplitudes show from instant to instant, and of ``h dOmega/dt / |i h Omega - lambda|``.
+
+    Args:
+        states: of the slow motion at these times.
+        speeds: (n, cmg) of the rotors [rad/s].
     """
     size = np.linalg.norm(bus_rate, axis=3)  # (n, cmg, order)
-    rate = np.broadcast_to(gimbal_rates[:, :, None], size.shape)
+    rate = np.broadcast_to(np.abs(states.gimbal_rate)[:, :, None], size.shape)
     if len(time) > 1:
         change = np.linalg.norm(np.diff(bus_rate, axis=0), axis=3) / np.diff(time)[:, None, None]
         change = np.maximum(np.append(change, change[-1:], 0), np.append(change[:1], change, 0))
         rate = np.maximum(rate, change / np.maximum(size, 1e-300))
-    s = 1j * np.asarray(satellite.cluster.rotor_speed)[:, None] * np.array(ORDERS)
+    s = 1j * speeds[:, :, None] * np.array(ORDERS)
     looks = np.array(sorted(modes))
-    distances = np.stack([np.min(np.abs(s[..., None] - modes[look]), axis=-1) for look in looks])
     nearest = np.argmin(np.abs(np.arange(len(time))[:, None] - looks), axis=1)
-    lag = rate / np.maximum(distances[nearest], 1e-300)
+    distance = np.empty(s.shape)
+    for i, look in enumerate(looks):
+        near = nearest == i
+        distance[near] = np.min(np.abs(s[near, ..., None] - modes[look]), axis=-1)
+    distance = np.maximum(distance, 1e-300)
+    if len(time) > 1:  # a line whose frequency changes passes by the mode
+        sweep = np.abs(np.gradient(speeds, time, axis=0))[:, :, None] * np.array(ORDERS)
+        rate = np.maximum(rate, sweep / distance)
+    lag = rate / distance
     total = np.sum(size, axis=(1, 2))
     return np.sum(lag * size, axis=(1, 2)) / np.where(total > 0.0, total, 1.0)
 
