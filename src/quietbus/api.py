@@ -19,6 +19,7 @@ from quietbus.dynamics.vibration import View
 from quietbus.jitter_study import JitterStudy
 from quietbus.results import aliasing, rotor_notes, to_dataset
 from quietbus.scenario import Scenario, load_scenario
+from quietbus.scenario.wheels import WheelCluster
 from quietbus.solve.direct import Scheme, Tolerances, integrate
 from quietbus.solve.harmonic import integrate_harmonic, on_periodic_solution
 from quietbus.study import Study
@@ -223,6 +224,8 @@ def linearize(
 
 def _gimbal_angles(scenario: Scenario, angles: ArrayLike | None) -> np.ndarray:
     count = scenario.cluster.count
+    if angles is not None and isinstance(scenario.cluster, WheelCluster):
+        raise ValueError("gimbal angles: expected none, since reaction wheels have no gimbals")
     own = scenario.cluster.gimbal_angles or np.zeros(count)
     return _vector("gimbal angles", own if angles is None else angles, count)
 

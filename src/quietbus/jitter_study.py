@@ -75,6 +75,11 @@ class JitterStudy:
             speeds = np.asarray(self.satellite(mount).cluster.rotor_speed)
             refuse_resonance(speeds, f"with mount {mount}", modes)
 
+    @property
+    def wheels(self) -> bool:
+        """Whether the units are reaction wheels: there are no gimbal angles to search then."""
+        return self.satellite("isolated").cluster.wheels
+
     def satellite(self, mount: str) -> Satellite:
         """Parameters of the model."""
         return self._satellites[mount]
@@ -199,7 +204,7 @@ class JitterStudy:
         together = {mount: self._combined_dict(mount) for mount in MOUNTS}
         envelope = {mount: self.combined(mount).envelope for mount in MOUNTS}
         worst = {}
-        for mount in MOUNTS:
+        for mount in () if self.wheels else MOUNTS:
             found = self.worst(mount)
             worst[mount] = {
                 "gimbal_angle_deg": np.rad2deg(found.gimbal_angle),

@@ -331,6 +331,11 @@ def scenario_of(run: xr.Dataset) -> Scenario:
     return Scenario.from_yaml(run.attrs["scenario"], source="the run's scenario")
 
 
+def has_gimbals(run: xr.Dataset) -> bool:
+    """Whether the units of a run are CMGs, and not reaction wheels."""
+    return not isinstance(scenario_of(run).cluster, WheelCluster)
+
+
 @dataclass(frozen=True)
 class Summary:
     """The numbers of a run that an engineer asks for first."""

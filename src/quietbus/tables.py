@@ -237,7 +237,8 @@ def _transmissibility(study: Study) -> Table:
 def jitter_tables(numbers: Mapping[str, Any]) -> Iterator[Table]:
     """What ``quietbus jitter`` says, from ``JitterStudy.to_dict``."""
     angles = ", ".join(f"{angle:.4g}" for angle in numbers["gimbal_angle_deg"])
-    lines = _titled(f"Bus rate at each rotor order, gimbals at {angles} deg, in deg/s")
+    where = f"gimbals at {angles} deg" if numbers["worst"] else "wheels at the start"
+    lines = _titled(f"Bus rate at each rotor order, {where}, in deg/s")
     for column in ("rotor", "order", "frequency", "axis", "isolated", "rigid", "left", "dB"):
         lines.add_column(column, justify="left" if column == "axis" else "right")
     shaken = [
@@ -298,6 +299,8 @@ def jitter_tables(numbers: Mapping[str, Any]) -> Iterator[Table]:
     parts.caption = f"parts below {NOISE:g} deg/s left out"
     yield parts
 
+    if not numbers["worst"]:
+        return
     worst = _titled("Worst gimbal angles: norm over axes of the sum of all amplitudes, in deg/s")
     for column in ("mount", "here", "worst", "at gimbal angles, deg"):
         worst.add_column(column, justify="right")

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from quietbus.plots.jitter import draw_lines_by_order, log_scale
-from quietbus.plots.run import TIME, finish_spectrum, gimbals, struts
+from quietbus.plots.run import TIME, finish_spectrum, struts, unit_figures
 from quietbus.plots.signals import (
     ANGLES,
     AXES,
@@ -51,7 +51,7 @@ def compare_figures(runs: Mapping[str, xr.Dataset]) -> dict[str, Figure]:
             "residual": residual(runs),
             "spectrum": last_spectra(runs) if harmonic else spectrum(runs),
             "attitude": attitude(runs),
-            "gimbals": gimbals(runs["isolated"]),
+            **unit_figures(runs["isolated"]),
             "struts": struts(runs["isolated"]),
         }
 

@@ -30,9 +30,12 @@ CROWDED = 12  # names side by side; more are turned
 
 
 def jitter_figures(study: JitterStudy) -> dict[str, Figure]:
-    """All pictures of a study by name; without jitter they say so."""
+    """All pictures of a study by name; without jitter they say so. ``worst`` needs gimbals."""
     with style():
-        return {"spectrum": spectrum(study), "budget": budget(study), "worst": worst(study)}
+        figures = {"spectrum": spectrum(study), "budget": budget(study)}
+        if not study.wheels:
+            figures["worst"] = worst(study)
+        return figures
 
 
 def spectrum(study: JitterStudy) -> Figure:

@@ -34,10 +34,11 @@ from quietbus.plots.style import (
     share_legend,
     style,
 )
-from quietbus.results import aliasing, scenario_of
+from quietbus.results import aliasing, has_gimbals, scenario_of
 from quietbus.solve.harmonic import SLOW_CHANGE
 
 TIME = "time [s]"
+RPM = 30.0 / np.pi  # of a rad/s
 # of a harmonic run's jitter: (what it is called, its line)
 COMBINED: dict[str, tuple[str, dict[str, Any]]] = {
     "envelope": ("envelope, phases as given", {"linewidth": 1.8}),
@@ -55,7 +56,7 @@ def run_figures(run: xr.Dataset) -> dict[str, Figure]:
         figures = {
             "attitude": attitude(run),
             "rates": rates_and_envelope(run) if is_harmonic(run) else rates(run),
-            "gimbals": gimbals(run),
+            **unit_figures(run),
             "spectrum": last_spectrum(run) if is_harmonic(run) else spectrum(run),
             "control": control(run),
         }
@@ -174,6 +175,40 @@ def gimbals(run: xr.Dataset) -> Figure:
         ],
         "CMG",
     )
+
+
+def unit_figures(run: xr.Dataset) -> dict[str, Figure]:
+    """What the units do, by name: ``gimbals`` of CMGs, ``rotors`` where speeds change."""
+    figures = {}
+    if has_gimbals(run):
+        figures["gimbals"] = gimbals(run)
+    if "rotor_speed" in run:
+        figures["rotors"] = rotors(run)
+    return figures
+
+
+def rotors(run: xr.Dataset) -> Figure:
+    """Speeds of the rotors and torques of their motors, with the limits of wheels."""
+    figure = _two_rows(
+        run,
+        heading(run, "Rotors"),
+        [
+            (RPM * run["rotor_speed"].to_numpy(), "speed [rpm]"),
+            (run["rotor_torque"].to_numpy(), "motor torque [N m]"),
+        ],
+        "CMG" if has_gimbals(run) else "wheel",
+    )
+    if has_gimbals(run):
+        return figure
+    motors = [wheel.motor for wheel in scenario_of(run).cluster.placed()]
+    for axes, name, factor in zip(figure.axes, ("speed", "torque"), (RPM, 1.0), strict=True):
+        limits = [getattr(motor, f"{name}_limit") for motor in motors]
+        for limit in {factor * limit for limit in limits if limit is not None}:
+            for side in (-limit, limit):
+                # only where it is near: elsewhere it would flatten the lines
+                if abs(side) <= 1.5 * np.max(np.abs(axes.get_ylim())):
+                    axes.axhline(side, color="0.4", linewidth=0.9, linestyle=":")
+    return figure
 
 
 def struts(run: xr.Dataset) -> Figure:

@@ -18,7 +18,7 @@ from quietbus.plots.signals import (
 from quietbus.report.harmonic import harmonic_pictures
 from quietbus.report.lines import GREY, Drawing, Panel, Picture, decimate, finished, line_look
 from quietbus.report.signals import jitter_over_time
-from quietbus.results import aliasing, scenario_of
+from quietbus.results import aliasing, has_gimbals, scenario_of
 
 BUCKETS = 2000  # stretches that a long line is cut into, each drawn by two points
 POINTS = 160_000  # over time on a page, about 3.5 MB
@@ -54,7 +54,10 @@ def _parts(run: xr.Dataset) -> Iterator[Drawing | Picture]:
         yield _jitter(run)
         yield _last_turns(run)
         yield _spectrum(run)
-    yield _gimbals(run)
+    if has_gimbals(run):
+        yield _gimbals(run)
+    if "rotor_speed" in run:
+        yield _rotors(run)
     yield _struts(run)
     if "spherical_force" in run:
         yield _joints(run)
@@ -237,6 +240,22 @@ def _gimbals(run: xr.Dataset) -> Drawing:
         [
             Panel("angle", "deg", degrees(run, "gimbal_angle"), names),
             Panel("rate", "deg/s", degrees(run, "gimbal_rate"), names),
+        ],
+    )
+
+
+def _rotors(run: xr.Dataset) -> Drawing:
+    kind = "CMG" if has_gimbals(run) else "Wheel"
+    names = [f"{kind} {number}" for number in range(run.sizes["cmg"])]
+    speed = 30.0 / np.pi * run["rotor_speed"].to_numpy()
+    return Drawing(
+        "rotors",
+        "Rotors",
+        "Speeds of the rotors, and torques of the motors that change them.",
+        run["time"].to_numpy(),
+        [
+            Panel("speed", "rpm", speed, names),
+            Panel("motor torque", "N m", run["rotor_torque"].to_numpy(), names),
         ],
     )
 
