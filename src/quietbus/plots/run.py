@@ -35,6 +35,7 @@ from quietbus.plots.style import (
     style,
 )
 from quietbus.results import aliasing, has_gimbals, scenario_of
+from quietbus.scenario.wheels import WheelCluster
 from quietbus.solve.harmonic import SLOW_CHANGE
 
 TIME = "time [s]"
@@ -198,9 +199,10 @@ def rotors(run: xr.Dataset) -> Figure:
         ],
         "CMG" if has_gimbals(run) else "wheel",
     )
-    if has_gimbals(run):
+    cluster = scenario_of(run).cluster
+    if not isinstance(cluster, WheelCluster):
         return figure
-    motors = [wheel.motor for wheel in scenario_of(run).cluster.placed()]
+    motors = [wheel.motor for wheel in cluster.placed()]
     for axes, name, factor in zip(figure.axes, ("speed", "torque"), (RPM, 1.0), strict=True):
         limits = [getattr(motor, f"{name}_limit") for motor in motors]
         for limit in {factor * limit for limit in limits if limit is not None}:
