@@ -11,12 +11,13 @@ import typer
 
 import quietbus as qb
 from quietbus import cli
-from quietbus.results import JOINT_VARIABLES, VARIABLES, Summary
+from quietbus.results import JOINT_VARIABLES, ROTOR_VARIABLES, VARIABLES, Summary
 from quietbus.scenario import builtin_names
 from quietbus.scenario.base import Part, UnitCount
 from quietbus.scenario.control import LAWS
 from quietbus.scenario.hardware import Unit
 from quietbus.scenario.units import Quantity
+from quietbus.scenario.wheels import Wheel
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -114,7 +115,7 @@ def test_results_page_has_every_variable_with_dimensions_and_unit():
         _unquoted(name): (tuple(dimensions.split(", ")) if dimensions else (), unit)
         for name, dimensions, unit, _, _ in _rows(_text("docs/results.md"), heading)
     }
-    variables = VARIABLES | JOINT_VARIABLES
+    variables = VARIABLES | ROTOR_VARIABLES | JOINT_VARIABLES
     described = {name: (dims, unit) for name, (dims, unit, _) in variables.items()}
     assert documented == described
 
@@ -159,7 +160,9 @@ def test_scenario_page_has_every_key_with_unit_and_default():
     rows = _rows(page, ("key", "unit", "default", "meaning"))
     documented = {_unquoted(key): (unit, default) for key, unit, default, _ in rows}
     assert len(documented) == len(rows), "a key is documented twice"
-    keys = dict(_keys(qb.Scenario))
+    keys: dict = {}
+    for key, described in _keys(qb.Scenario):
+        keys.setdefault(key, described)  # what CMGs and wheels have in common is described once
     mappings = {key for key, (is_mapping, _, _) in keys.items() if is_mapping}
     assert documented.keys() - keys.keys() == set()
     assert {key for key in mappings if f"`{key}`" not in page} == set()
@@ -184,8 +187,8 @@ def _keys(model: type[Part], prefix: str = ""):
         unit = units[0] or "-" if units else "-" if hints[name] in _COUNTS else ""
         default = "required" if field.is_required() else field.default
         key = prefix + name
-        if model is Unit:
-            parts = []  # its rotor and gimbal body have the keys of the cluster's
+        if model in (Unit, Wheel):
+            parts = []  # its rotor and other parts have the keys of the cluster's
         yield key, (bool(parts), unit, default)
         for part in parts:
             yield from _keys(part, f"{key}[]." if listed else f"{key}.")
