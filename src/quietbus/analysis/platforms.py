@@ -105,7 +105,7 @@ class Platforms:
         control = small.control
         if control is not None:
             control = eqx.tree_at(lambda c: c.reaction, control, T.T @ control.reaction)
-        matrices = (T.T @ matrix @ T for matrix in (small.M, small.C, small.K))
+        matrices = (jnp.asarray(T.T @ matrix @ T) for matrix in self._matrices)
         return _equations(small.slow, matrices, control, T)
 
     def response(self, mount: str = "isolated") -> np.ndarray:
@@ -137,11 +137,16 @@ class Platforms:
         """
         rates = steering_commands(as_one_cluster(self.satellites), self._all_angles) @ torque
         force = self.reaction[1] @ rates
-        T, M = self.rigid, self.small.M
+        T, (M, _, K) = self.rigid, self._matrices
         gathering = T @ np.linalg.solve(T.T @ M @ T, T.T @ force)
         plates = slice(0, -6)
-        at = np.linalg.solve(self.small.K[plates, plates], (force - M @ gathering)[plates])
+        at = np.linalg.solve(K[plates, plates], (force - M @ gathering)[plates])
         return np.append(at, np.zeros(6))
+
+    @property
+    def _matrices(self) -> tuple[np.ndarray, ...]:
+        """M, C and K."""
+        return tuple(np.asarray(m) for m in (self.small.M, self.small.C, self.small.K))
 
     @property
     def _all_angles(self) -> np.ndarray:
@@ -160,7 +165,7 @@ class Platforms:
 
     def _plates_in_bus(self, held: bool) -> np.ndarray:
         if held:
-            M, C, K = (m[:-6, :-6] for m in (self.small.M, self.small.C, self.small.K))
+            M, C, K = (matrix[:-6, :-6] for matrix in self._matrices)
             n, unit = len(M), np.eye(len(M))
             pull, damp = np.linalg.solve(M, -K), np.linalg.solve(M, -C)
             return np.block([[np.zeros((n, n)), unit], [pull, damp]])
@@ -180,11 +185,11 @@ class Platforms:
             actuator: "servo": gimbals follow their rate commands through the servo. "ideal": at
                 once.
         """
-        T, small = self.rigid, self.small
+        T = self.rigid
         n = len(T) - 6
         # xi = basis (r_B, theta_B, plates in the bus); the legs resist only the latter
         basis = np.hstack([T, np.eye(n + 6)[:, :n]])
-        M, C, K = (basis.T @ m @ basis for m in (small.M, small.C, small.K))
+        M, C, K = (basis.T @ matrix @ basis for matrix in self._matrices)
         K[:, :6] = 0.0  # at rest nothing depends on where the satellite is as a whole
         pull, damp = np.linalg.solve(M, -K), np.linalg.solve(M, -C)
         command = steering_commands(as_one_cluster(self.satellites), self._all_angles)
