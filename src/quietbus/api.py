@@ -5,7 +5,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import jax.numpy as jnp
 import numpy as np
@@ -200,7 +200,7 @@ def platforms(
         ResonanceError: an order of a rotor lies on an undamped mode.
     """
     loaded = tuple(_as_run(scenario, None, None) for scenario in scenarios)
-    given: Sequence[ArrayLike | None] = gimbal_angles or [None] * len(loaded)
+    given: list[Any] = [None] * len(loaded) if gimbal_angles is None else list(gimbal_angles)
     if len(given) != len(loaded):
         raise ValueError(
             f"gimbal_angles: expected {len(loaded)} lists, one for each scenario, got {len(given)}"
