@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from quietbus.analysis.coupled import CoupledAnalysis, analyze_coupled
 from quietbus.analysis.jitter import AT_REST, Combined, combine
@@ -77,7 +78,7 @@ class PlatformStudy:
         angles = np.outer(np.concatenate(phases), orders)
         return combine(self.bus_rate(mount), self.platforms.frequency, angles)
 
-    def static_stroke(self, torque: Sequence[float]) -> tuple[np.ndarray, ...]:
+    def static_stroke(self, torque: ArrayLike) -> tuple[np.ndarray, ...]:
         """Strokes (leg,) [m] of each platform's legs as a control torque [N m] sets in."""
         return self.platforms.strokes(self.platforms.turned(np.asarray(torque, float)))
 

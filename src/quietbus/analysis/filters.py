@@ -169,9 +169,13 @@ def _compiled(satellites, angles):
     return eqx.filter_vmap(filtered_jitter)(satellites, jnp.asarray(angles))
 
 
+def platform_at_rest(satellite: Satellite, gimbal_angle: np.ndarray) -> HeldPlatform:
+    """The platform of a satellite at rest, bus held; gimbal_angle (cmg,) [rad]."""
+    return _compiled_platform(satellite, jnp.asarray(gimbal_angle))
+
+
 @eqx.filter_jit
-def platform_at_rest(satellite: Satellite, gimbal_angle: Float[Array, " cmg"]) -> HeldPlatform:
-    """The platform of a satellite at rest, bus held."""
+def _compiled_platform(satellite, gimbal_angle):
     satellite, slow, moments = at_rest(replace(satellite, mount="isolated"), gimbal_angle)
     legs = leg_coefficients(satellite, slow)
     return held_platform(slow, legs, body_coefficients(satellite, slow, moments.averaged()))
