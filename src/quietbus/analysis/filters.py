@@ -4,7 +4,7 @@ Jitter budgets made with finite elements often have no isolator in the structure
 disturbance components go through one filter each and act on the structure as if the CMG were
 bolted to it (Gary et al. 1998, Meza et al. 2005, as cited by Zhang and Xu 2012). Each filter is
 the single-axis isolator of Zhang and Xu's eq. 1 for one degree of freedom of the platform on a
-held bus, about the platform's mass centre and along its axes (docs/theory.md, section 16).
+held bus, about the platform's mass centre and along its axes (docs/theory.md, section 14.9).
 """
 
 from collections.abc import Sequence

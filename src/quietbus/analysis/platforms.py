@@ -3,7 +3,7 @@
 Every platform with the bus is a satellite, whose equations of small vibration are derivatives of
 the nonlinear ones (``dynamics.vibration``). On the freedoms ``(r_P1, theta_P1, ..., r_B, theta_B)``
 they add up, the bus counted once: platforms touch each other through the bus only
-(docs/theory.md, section 17). At rest in the nominal pose; all vectors along bus axes.
+(docs/theory.md, section 14.10). At rest in the nominal pose; all vectors along bus axes.
 """
 
 from collections.abc import Iterable, Sequence
@@ -169,10 +169,24 @@ class Platforms:
             n, unit = len(M), np.eye(len(M))
             pull, damp = np.linalg.solve(M, -K), np.linalg.solve(M, -C)
             return np.block([[np.zeros((n, n)), unit], [pull, damp]])
-        model = self.linear("ideal")
-        kept = [i for i, name in enumerate(model.states) if name not in _ATTITUDE]
-        kept = [i for i in kept if not model.states[i].startswith("gimbal_")]
-        return model.A[np.ix_(kept, kept)]
+        _, pull, damp = self._in_bus()
+        n = len(pull)
+        unit = np.eye(n)
+        A = np.block([[np.zeros((n, n)), unit], [pull, damp]])
+        return A[3:, 3:]  # nothing depends on the attitude
+
+    def _in_bus(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Inverse mass on the forces of all freedoms, and accelerations by pose and by rate.
+
+        Of (theta_B, plates relative to the bus); the satellite's place as a whole is left out.
+        """
+        n = len(self.rigid) - 6
+        # xi = basis (r_B, theta_B, plates in the bus); the legs resist only the latter
+        basis = np.hstack([self.rigid, np.eye(n + 6)[:, :n]])
+        M, C, K = (basis.T @ matrix @ basis for matrix in self._matrices)
+        K[:, :6] = 0.0  # at rest nothing depends on where the satellite is as a whole
+        inverse = np.linalg.inv(M)
+        return (inverse @ basis.T)[3:], -(inverse @ K)[3:, 3:], -(inverse @ C)[3:, 3:]
 
     def linear(self, actuator: Actuator = "servo") -> LinearModel:
         """The uncontrolled satellite as a state-space model.
@@ -185,34 +199,27 @@ class Platforms:
             actuator: "servo": gimbals follow their rate commands through the servo. "ideal": at
                 once.
         """
-        T = self.rigid
-        n = len(T) - 6
-        # xi = basis (r_B, theta_B, plates in the bus); the legs resist only the latter
-        basis = np.hstack([T, np.eye(n + 6)[:, :n]])
-        M, C, K = (basis.T @ matrix @ basis for matrix in self._matrices)
-        K[:, :6] = 0.0  # at rest nothing depends on where the satellite is as a whole
-        pull, damp = np.linalg.solve(M, -K), np.linalg.solve(M, -C)
+        by_force, pull, damp = self._in_bus()
         command = steering_commands(as_one_cluster(self.satellites), self._all_angles)
         cmg = command.shape[0]
-        by_rate, by_acceleration = (np.linalg.solve(M, basis.T @ r) for r in self.reaction[1:])
-        kept = np.arange(3, n + 6)  # without position and velocity as a whole
-        m = len(kept)
+        by_rate, by_acceleration = (by_force @ r for r in self.reaction[1:])
+        m = len(pull)
         zero = np.zeros((m, m))
         if actuator == "ideal":
-            A = np.block([[zero, np.eye(m)], [pull[3:, 3:], damp[3:, 3:]]])
-            B = np.vstack([np.zeros((m, 3)), (by_rate @ command)[3:]])
+            A = np.block([[zero, np.eye(m)], [pull, damp]])
+            B = np.vstack([np.zeros((m, 3)), by_rate @ command])
         else:
             bandwidth = float(self.satellites[0].servo.bandwidth)
-            driven = (by_rate - bandwidth * by_acceleration)[3:]
+            driven = by_rate - bandwidth * by_acceleration
             A = np.block(
                 [
                     [zero, np.eye(m), np.zeros((m, cmg))],
-                    [pull[3:, 3:], damp[3:, 3:], driven],
+                    [pull, damp, driven],
                     [np.zeros((cmg, 2 * m)), -bandwidth * np.eye(cmg)],
                 ]
             )
             lag = bandwidth * command
-            B = np.vstack([np.zeros((m, 3)), by_acceleration[3:] @ lag, lag])
+            B = np.vstack([np.zeros((m, 3)), by_acceleration @ lag, lag])
         unit = np.eye(len(A))
         return LinearModel(
             A,
@@ -251,9 +258,6 @@ class Platforms:
         gain = own / own[0]
         at = np.argmax(gain, axis=0)
         return hz[at], gain[at, np.arange(3)]
-
-
-_ATTITUDE = tuple(f"bus_attitude_{axis}" for axis in AXES)
 
 
 def as_one_cluster(satellites: Sequence[Satellite]) -> Satellite:

@@ -96,14 +96,14 @@ def filters(bench: Bench) -> Findings:
         momentum.fill_between(MOMENTA, low, high, color=COLOURS[i], alpha=0.15, linewidth=0.0)
         momentum.plot(MOMENTA, middle, color=COLOURS[i], linestyle=DASHES[i])
     momentum.axvline(15.0, color="0.6", linewidth=1.0, linestyle=":")
-    momentum.set(xscale="log", xlabel="rotor momentum\n[N m s], any gimbal angles")
+    momentum.set(xscale="log", xlabel="rotor momentum\n[N m s]")
     for axes in panels:
         axes.axhspan(1e-3, GOOD, color="0.9", zorder=0)
         axes.set(yscale="log", ylim=(5e-3, 3.0))
         if axes is not panels[0]:
             axes.tick_params(labelleft=False)
     panels[0].set_ylabel("error of the filters,\n6000 rpm [-]")
-    panels[2].legend(*panels[0].get_legend_handles_labels(), loc="center right", fontsize=8)
+    momentum.legend(*panels[0].get_legend_handles_labels(), loc="center right", fontsize=8)
     numbers = _filter_numbers(sweep, own, platform, found, turned, hz)
     return Findings(figure, _filter_caption(numbers), numbers, _filter_text(numbers))
 
@@ -215,7 +215,7 @@ def _filter_text(n: dict[str, float]) -> str:
         f"{n['filter_frequency_x']:.2f} Hz for forces, {n['filter_frequency_about_x']:.2f}, "
         f"{n['filter_frequency_about_y']:.2f} and {n['filter_frequency_about_z']:.2f} Hz for "
         "torques about x, y, z; with the numerator c s + k each is the paper's eq. 1. Both models "
-        "get the same rotors; gimbals held (docs/theory.md, section 16)."
+        "get the same rotors; gimbals held (docs/theory.md, section 14.9)."
     )
 
 
@@ -223,7 +223,8 @@ def _filter_caption(n: dict[str, float]) -> str:
     return (
         "Top: bus rate at order 1 of the rotors over rotor speed, root sum of squares over rotors. "
         "Bottom: error of the filters at 6000 rpm, that of the complex amplitudes over their size "
-        "(grey: within 10 %; dotted: the paper's satellite). **About z the filters are good "
+        "(grey: within 10 %; dotted: the paper's satellite; over momentum the middle and 5 % to "
+        "95 % of random gimbal angles). **About z the filters are good "
         f"enough**: {100 * n['filters_z_error']:.0f} % off at 6000 rpm, and above 10 % only from "
         f"{n['filters_z_off_from_hz']:.1f} to {n['filters_z_off_to_hz']:.1f} Hz "
         f"({100 * n['filters_z_worst_error']:.0f} %), where the bus's products of inertia bring "
