@@ -156,9 +156,11 @@ def filtered_jitter(satellite: Satellite, gimbal_angle: Float[Array, " cmg"]) ->
 def filtered_jitter_of_designs(
     designs: Sequence[Satellite], gimbal_angle: np.ndarray
 ) -> FilteredJitter:
-    """``filtered_jitter`` of satellites alike but for their numbers; arguments as of
+    """``filtered_jitter`` of satellites alike but for their numbers, in one compiled program.
 
-    ``quietbus.jitter_study.jitter_of_designs``.
+    Args:
+        designs: with the same number of legs and CMGs, control and steering law.
+        gimbal_angle: (cmg,) [rad], or (design, cmg) for each its own.
     """
     angles = np.broadcast_to(gimbal_angle, (len(designs), *gimbal_angle.shape[-1:]))
     return for_designs(_compiled, designs, angles)
