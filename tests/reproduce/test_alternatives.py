@@ -80,7 +80,7 @@ def test_filters_are_good_about_z_and_least_wrong_near_the_centre_of_stiffness(o
 
 
 def test_one_isolator_per_cmg_against_the_existing_analyses(bench, monkeypatch):
-    for name, fewer in (("SWEEP_HZ", [1.0, 100.0]), ("SCALES", [0.25, 1.0]), ("ANGLES", 1)):
+    for name, fewer in (("SWEEP_HZ", [100.0]), ("SCALES", [1.0]), ("ANGLES", 1)):
         monkeypatch.setattr(per_cmg, name, np.array(fewer) if name != "ANGLES" else fewer)
     numbers = per_cmg.per_cmg(bench).numbers
     study = bench.study

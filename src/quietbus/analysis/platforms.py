@@ -32,6 +32,7 @@ from quietbus.dynamics.vibration import (
     vibration,
 )
 from quietbus.model.cmg import ORDERS, ControlMomentGyro
+from quietbus.model.guidance import StepGuidance
 from quietbus.model.satellite import Satellite
 from quietbus.spatial.rotation import quaternion_to_matrix
 
@@ -67,7 +68,7 @@ class Platforms:
         M[bus[:3], bus[:3]] = float(satellites[0].bus.mass)
         M[np.ix_(bus[3:], bus[3:])] = satellites[0].bus.I_BBcm_B
         parts = [
-            jax.tree.map(np.asarray, _platform(satellite, jnp.asarray(own)))
+            jax.tree.map(np.asarray, _platform(_uncontrolled(satellite), jnp.asarray(own)))
             for satellite, own in zip(satellites, angles, strict=True)
         ]
         forces, reactions = [], []
@@ -252,12 +253,21 @@ class Platforms:
         The gain is angular acceleration about an axis by the torque asked for about it, over what
         it is at low frequency; gimbals follow at once.
         """
-        hz = np.geomspace(0.05, 100.0, 4000)
-        rates = self.linear("ideal").select(None, ["bus_rate"]).response(hz)
-        own = np.abs(np.einsum("fii->fi", rates)) * hz[:, None]
-        gain = own / own[0]
-        at = np.argmax(gain, axis=0)
-        return hz[at], gain[at, np.arange(3)]
+        model = self.linear("ideal").select(None, ["bus_rate"])
+
+        def gain(hz: np.ndarray) -> np.ndarray:
+            return np.abs(np.einsum("fii->fi", model.response(hz))) * hz[:, None]
+
+        hz = np.geomspace(0.05, 100.0, 500)
+        coarse = gain(hz)
+        peaks = []
+        for axis, k in enumerate(np.argmax(coarse, axis=0)):
+            near = np.linspace(hz[max(k - 1, 0)], hz[min(k + 1, len(hz) - 1)], 200)
+            fine = gain(near)[:, axis]
+            best = int(np.argmax(fine))
+            peaks.append((near[best], fine[best] / coarse[0, axis]))
+        found = np.array(peaks)
+        return found[:, 0], found[:, 1]
 
 
 def as_one_cluster(satellites: Sequence[Satellite]) -> Satellite:
@@ -298,9 +308,14 @@ class _Part(eqx.Module):
     slow: SlowMotion
 
 
+def _uncontrolled(satellite: Satellite) -> Satellite:
+    """What matters to a platform alone, so that one program serves all controls and guidances."""
+    guidance = StepGuidance(jnp.array([1.0, 0.0, 0.0, 0.0]))
+    return replace(satellite, controller=None, steering=None, guidance=guidance)
+
+
 @eqx.filter_jit
 def _platform(satellite: Satellite, gimbal_angle: Float[Array, " cmg"]) -> _Part:
-    satellite = replace(satellite, controller=None, steering=None)
     satellite, slow, moments = at_rest(satellite, jnp.asarray(gimbal_angle))
     bus = (jnp.zeros(()), jnp.zeros((3, 3)))
     alone = eqx.tree_at(lambda s: (s.bus.mass, s.bus.I_BBcm_B), satellite, bus)

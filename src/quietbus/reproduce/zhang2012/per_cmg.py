@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from quietbus import api
+from quietbus.analysis.coupled import stable_gain_range
 from quietbus.analysis.filters import platform_at_rest
 from quietbus.analysis.platforms import Platforms
 from quietbus.model.satellite import Satellite
@@ -103,10 +104,10 @@ def _over_speed(scenario: Scenario, hz: float) -> tuple[float, float, float]:
 
 def _figures(study: PlatformStudy) -> tuple[float, float, float]:
     """Bus rate [1e-6 deg/s], upper limit of K, largest stroke [mm] by 1 N m of control torque."""
-    coupled = study.coupled
-    if coupled is None:
+    if study.pid is None:
         raise RuntimeError("zhang2012 has no control")
-    limit = float(coupled.stable_gain_range[-1][1] or np.inf)
+    ranges = stable_gain_range(study.platforms.controlled(study.pid))
+    limit = float(ranges[-1][1] or np.inf)
     strokes = [np.abs(np.concatenate(study.static_stroke(way))).max() for way in np.eye(3)]
     return MICRO * _norm(study), limit, 1e3 * float(max(strokes))
 
