@@ -5,8 +5,10 @@ from .api import analyze as analyze
 from .api import compare as compare
 from .api import jitter as jitter
 from .api import linearize as linearize
+from .api import platforms as platforms
 from .api import simulate as simulate
 from .jitter_study import JitterStudy as JitterStudy
+from .platform_study import PlatformStudy as PlatformStudy
 from .results import load_run as load_run
 from .results import reconstruct as reconstruct
 from .results import save_run as save_run
@@ -15,6 +17,7 @@ from .results import summarize as summarize
 from .scenario import Scenario as Scenario
 from .scenario import ScenarioError as ScenarioError
 from .scenario import load_scenario as load_scenario
+from .scenario import per_cmg_scenarios as per_cmg_scenarios
 from .solve.harmonic import ResonanceError as ResonanceError
 
 __version__: str

@@ -4,8 +4,8 @@ import concurrent.futures
 import threading
 import time
 import warnings
-from collections.abc import Callable, Mapping
-from typing import Literal
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal
 
 import jax.numpy as jnp
 import numpy as np
@@ -17,6 +17,7 @@ from quietbus.dynamics.linearize import Actuator, LinearModel, OperatingPoint
 from quietbus.dynamics.linearize import linearize as linearize_satellite
 from quietbus.dynamics.vibration import View
 from quietbus.jitter_study import JitterStudy
+from quietbus.platform_study import PlatformStudy
 from quietbus.results import aliasing, to_dataset
 from quietbus.scenario import Scenario, load_scenario
 from quietbus.solve.direct import Scheme, Tolerances, integrate
@@ -176,6 +177,36 @@ def jitter(scenario: Scenario | str, gimbal_angle: ArrayLike | None = None) -> J
     """
     scenario = _as_run(scenario, None, None)
     return JitterStudy(scenario, _gimbal_angles(scenario, gimbal_angle))
+
+
+def platforms(
+    scenarios: Sequence[Scenario | str], gimbal_angles: Sequence[ArrayLike] | None = None
+) -> PlatformStudy:
+    """Jitter, modes and control of one bus with several platforms, one for each scenario.
+
+    ``per_cmg_scenarios`` makes such scenarios of one with a single platform.
+
+    Args:
+        scenarios: each the bus with one platform and its CMGs (a scenario, a path, or a built-in's
+            name); bus and control must be the same in all.
+        gimbal_angles: (cmg,) [rad] for each scenario, instead of its own.
+
+    Returns:
+        The study, whose parts are computed when asked for (docs/platforms.md).
+
+    Raises:
+        ScenarioError: a scenario is not valid, or bus or control differ.
+        ValueError: a wrong number of gimbal angles, or a satellite that cannot rest.
+        ResonanceError: an order of a rotor lies on an undamped mode.
+    """
+    loaded = tuple(_as_run(scenario, None, None) for scenario in scenarios)
+    given: list[Any] = [None] * len(loaded) if gimbal_angles is None else list(gimbal_angles)
+    if len(given) != len(loaded):
+        raise ValueError(
+            f"gimbal_angles: expected {len(loaded)} lists, one for each scenario, got {len(given)}"
+        )
+    angles = (_gimbal_angles(s, own) for s, own in zip(loaded, given, strict=True))
+    return PlatformStudy(loaded, tuple(angles))
 
 
 def linearize(

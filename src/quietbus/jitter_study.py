@@ -13,12 +13,14 @@ import numpy as np
 
 from quietbus.analysis.channels import json_ready
 from quietbus.analysis.jitter import (
+    AT_REST,
     KINDS,
     SEARCHED,
     Combined,
     WorstAngles,
     budget,
     combine,
+    for_designs,
     imbalance_kinds,
     rest_error,
     steady_jitter,
@@ -32,7 +34,6 @@ from quietbus.scenario import Scenario, ScenarioError
 from quietbus.solve.harmonic import refuse_resonance
 
 MOUNTS = ("isolated", "rigid")
-AT_REST = 1e-6  # [m/s^2, rad/s^2] accelerations smaller than this are none
 ARCSEC = np.rad2deg(1.0) * 3600.0
 # differences of the scenario's algebra: offsets in steps and weights
 _CENTRAL: tuple[tuple[int, ...], np.ndarray] = (
@@ -276,19 +277,7 @@ def _compute(
     designs: Sequence[Satellite], angles: np.ndarray
 ) -> tuple[dict[str, np.ndarray], Vibration]:
     """Amplitudes and the equations that they solve, in one program for any number of designs."""
-    parts = []
-    for start in range(0, len(designs), SEARCHED):
-        these = list(designs[start : start + SEARCHED])
-        missing = SEARCHED - len(these)
-        stacked = jax.tree.map(
-            lambda *each: np.stack(each) if eqx.is_array(each[0]) else each[0],
-            *these,
-            *these[-1:] * missing,
-        )
-        at = np.pad(angles[start : start + SEARCHED], ((0, missing), (0, 0)), mode="edge")
-        part = _compiled_designs(stacked, at)
-        parts.append(jax.tree.map(lambda leaf: np.asarray(leaf)[: len(these)], part))  # noqa: B023
-    return jax.tree.map(lambda *each: np.concatenate(each), *parts)
+    return for_designs(_compiled_designs, designs, angles)
 
 
 @eqx.filter_jit

@@ -1,8 +1,10 @@
 """Jitter at one operating point, of each rotor, of each kind of imbalance, and of all together."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -13,6 +15,7 @@ from scipy.stats import qmc
 from quietbus.dynamics.closed_loop import initial_state
 from quietbus.dynamics.vibration import (
     NOTHING_SEEN,
+    SlowMotion,
     Vibration,
     leg_coefficients,
     linear_outputs,
@@ -24,6 +27,8 @@ from quietbus.model.cmg import ORDERS, ClusterMoments
 from quietbus.model.guidance import StepGuidance
 from quietbus.model.satellite import Satellite
 
+Result = TypeVar("Result")
+AT_REST = 1e-6  # [m/s^2, rad/s^2] accelerations smaller than this are none
 SAME_FREQUENCY = 1e-9  # relative: lines closer than this are one
 
 
@@ -75,6 +80,18 @@ def _groups(frequency: np.ndarray) -> list[np.ndarray]:
     return [member == i for i in range(len(starts))]
 
 
+def at_rest(
+    satellite: Satellite, gimbal_angle: Float[Array, " cmg"]
+) -> tuple[Satellite, SlowMotion, ClusterMoments]:
+    """The satellite at its target, its plate in the nominal pose, free of loads."""
+    unit = jnp.array([1.0, 0.0, 0.0, 0.0])
+    satellite = replace(satellite, guidance=StepGuidance(unit), loads=())
+    state = initial_state(satellite, unit, jnp.zeros(3), gimbal_angle)
+    moments = ClusterMoments.expand(satellite.cluster)
+    slow = slow_motion(satellite, jnp.zeros(()), state, moments.averaged())
+    return satellite, slow, moments
+
+
 def steady_jitter(
     satellite: Satellite, gimbal_angle: Float[Array, " cmg"]
 ) -> tuple[dict[str, Complex[Array, "cmg order ..."]], Vibration]:
@@ -83,11 +100,7 @@ def steady_jitter(
     The satellite is at its target, its plate in the nominal pose, no load acts; ``rest_error``
     tells whether that is an equilibrium. Also the equations that the amplitudes solve.
     """
-    unit = jnp.array([1.0, 0.0, 0.0, 0.0])
-    satellite = replace(satellite, guidance=StepGuidance(unit), loads=())
-    state = initial_state(satellite, unit, jnp.zeros(3), gimbal_angle)
-    moments = ClusterMoments.expand(satellite.cluster)
-    slow = slow_motion(satellite, jnp.zeros(()), state, moments.averaged())
+    satellite, slow, moments = at_rest(satellite, gimbal_angle)
     small = vibration(satellite, slow, moments, leg_coefficients(satellite, slow))
     xi = rotor_response(small, moments)
     s = 1j * moments.rotor_speed[:, None] * jnp.array(ORDERS)
@@ -172,4 +185,31 @@ def worst_angles(measure: Callable[[np.ndarray], np.ndarray], count: int) -> Wor
     return WorstAngles(found.x, -float(found.fun), SEARCHED * int(found.nfev))
 
 
-SEARCHED = 64  # sets of gimbal angles looked at together
+SEARCHED = 64  # sets of gimbal angles, or designs, looked at together
+
+
+def for_designs(
+    program: Callable[[Satellite, np.ndarray], Result],
+    designs: Sequence[Satellite],
+    angles: np.ndarray,
+) -> Result:
+    """What a program gives for many satellites alike but for their numbers, compiled once.
+
+    Args:
+        program: compiled; from SEARCHED satellites, stacked, and their (SEARCHED, cmg) angles.
+        designs: any number of satellites.
+        angles: (design, cmg) [rad].
+    """
+    parts = []
+    for start in range(0, len(designs), SEARCHED):
+        these = list(designs[start : start + SEARCHED])
+        missing = SEARCHED - len(these)
+        stacked = jax.tree.map(
+            lambda *each: np.stack(each) if eqx.is_array(each[0]) else each[0],
+            *these,
+            *these[-1:] * missing,
+        )
+        at = np.pad(angles[start : start + SEARCHED], ((0, missing), (0, 0)), mode="edge")
+        part = program(stacked, at)
+        parts.append(jax.tree.map(lambda leaf: np.asarray(leaf)[: len(these)], part))  # noqa: B023
+    return jax.tree.map(lambda *each: np.concatenate(each), *parts)

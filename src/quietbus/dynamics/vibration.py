@@ -235,7 +235,7 @@ def vibration(
     W = jnp.kron(jnp.eye(4), W)
     C = all_.M @ (W + V) - all_.by_speed
     K = all_.M @ W @ V - all_.by_pose - all_.by_speed @ V
-    control = _control(satellite, slow, moments)
+    control = control_path(satellite, slow, moments)
     if satellite.mount == "isolated":
         return Vibration(slow, all_.M, C, K, control, None)
     T = rigid_speeds(satellite, slow.plates)
@@ -247,7 +247,7 @@ def vibration(
     return Vibration(slow, M, C, K, control, T)
 
 
-def _control(satellite, slow, moments):
+def control_path(satellite: Satellite, slow: SlowMotion, moments: ClusterMoments) -> Control | None:
     """Derivatives of what controller, steering and servo decide, and the gimbals' reaction."""
     if satellite.controller is None or satellite.steering is None:
         return None
@@ -269,16 +269,23 @@ def _control(satellite, slow, moments):
         signals = control_signals(satellite, slow.t, moved)
         return jnp.concatenate([signals.gimbal_acceleration, signals.integral_rate])
 
+    nothing = (jnp.zeros(3), jnp.zeros(3), jnp.zeros(3), jnp.zeros(n), jnp.zeros(n))
+    by = jax.jacfwd(decide, argnums=tuple(range(5)))(*nothing)
+    return Control(by[0], by[1], by[2], by[3], by[4], gimbal_reaction(slow, moments))
+
+
+def gimbal_reaction(slow: SlowMotion, moments: ClusterMoments) -> Float[Array, "3 12 cmg"]:
+    """Forces on (v_P, w_P, v_B, w_B) by each gimbal's angle, rate and acceleration."""
+
     def reaction(gimbal):
         push = jax.vmap(plate_force, (None, 0, None))
         return push(slow.plates, moments.order(0, *gimbal), slow.u_rate[:6])
 
-    nothing = (jnp.zeros(3), jnp.zeros(3), jnp.zeros(3), jnp.zeros(n), jnp.zeros(n))
     # each unit's reaction is its own: one derivative for all units at once
+    n = len(slow.gimbal[0])
     ways = [tuple(jnp.full(n, float(i == k)) for i in range(3)) for k in range(3)]
     reactions = jnp.stack([jax.jvp(reaction, (slow.gimbal,), (way,))[1].T for way in ways])
-    by = jax.jacfwd(decide, argnums=tuple(range(5)))(*nothing)
-    return Control(by[0], by[1], by[2], by[3], by[4], jnp.pad(reactions, ((0, 0), (0, 6), (0, 0))))
+    return jnp.pad(reactions, ((0, 0), (0, 6), (0, 0)))
 
 
 def rotor_forces(slow: SlowMotion, moments: ClusterMoments) -> Complex[Array, "order cmg 12"]:

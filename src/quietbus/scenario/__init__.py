@@ -2,6 +2,7 @@
 
 from quietbus.scenario.errors import Problem, ScenarioError
 from quietbus.scenario.load import builtin_names, builtin_text, load_scenario, template_text
+from quietbus.scenario.per_cmg import per_cmg_scenarios
 from quietbus.scenario.schema import Scenario
 
 __all__ = [
@@ -11,5 +12,6 @@ __all__ = [
     "builtin_names",
     "builtin_text",
     "load_scenario",
+    "per_cmg_scenarios",
     "template_text",
 ]
