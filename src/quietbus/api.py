@@ -146,12 +146,14 @@ def compare(
             concurrent.futures.wait(futures.values())
         except KeyboardInterrupt:
             stop.set()
-        runs = {mount: future.result() for mount, future in futures.items()}
-    for mount, done in runs.items():
-        unseen = ripple_unseen(_as_run(scenario, mount, duration), done["gimbal_rate"].to_numpy())
+        runs: dict[str, xr.Dataset] = {}
+        for mount, future in futures.items():
+            runs[mount] = future.result()
+    for name, done in runs.items():
+        unseen = ripple_unseen(_as_run(scenario, None, duration), done["gimbal_rate"].to_numpy())
         if unseen:
-            warnings.warn(f"{mount}: {unseen}", QuietbusWarning, stacklevel=2)
-    return dict(runs)
+            warnings.warn(f"{name}: {unseen}", QuietbusWarning, stacklevel=2)
+    return runs
 
 
 def analyze(scenario: Scenario | str, gimbal_angle: ArrayLike | None = None) -> Study:

@@ -154,7 +154,7 @@ def on_periodic_solution(satellite: Satellite, state: State) -> State:
         for base, together in _periods(orders):
             turns = max(TURNS, 4 * round(np.max(orders[together]) / base) + 4)
             chosen = (speeds == speed)[:, None] & together
-            square = _jitter_squared(satellite, state, small, xi, chosen, base, turns)
+            square = _jitter_squared(satellite, state, small, xi, chosen, jnp.asarray(base), turns)
             moved = _answer_to_square(small, square, base * speed)
             for part, more in zip(second, moved, strict=True):
                 part += more
@@ -402,6 +402,16 @@ def respond(
     growing = _growing(last, 1.0 / max(float(time[-1]), 1e-9))
     if growing:
         said.append(f"the slow motion is unstable: {growing}")
+    if satellite.motor is not None:
+        index = satellite.motor.modulation(
+            satellite.cluster, jnp.asarray(states.gimbal_rate)[:done], satellite.servo.bandwidth
+        )
+        if np.max(index) > SLOW_CHANGE:
+            said.append(
+                f"the gimbal motors' ripple turns the gimbals by up to {np.max(index):.2g} rad of "
+                "its own phase: the jitter that it causes may be wrong by as much (above "
+                f"{SLOW_CHANGE:g} rad use method 'direct')"
+            )
     noise = _broadband(satellite, looked, modes, view)
     return Jitter(amplitudes, error, tuple(said), ripples, noise), done
 
