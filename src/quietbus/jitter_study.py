@@ -27,11 +27,11 @@ from quietbus.analysis.jitter import (
     worst_angles,
 )
 from quietbus.build import build_satellite
-from quietbus.dynamics.vibration import Vibration
-from quietbus.model.cmg import ORDERS
+from quietbus.dynamics.vibration import NOTHING_SEEN, Vibration
 from quietbus.model.satellite import Satellite
 from quietbus.scenario import Scenario, ScenarioError
 from quietbus.solve.harmonic import refuse_resonance
+from quietbus.solve.noise import Broadband, noise_spectra
 
 MOUNTS = ("isolated", "rigid")
 ARCSEC = np.rad2deg(1.0) * 3600.0
@@ -83,10 +83,15 @@ class JitterStudy:
     def _satellites(self) -> dict[str, Satellite]:
         return {mount: build_satellite(self.scenario, mount) for mount in MOUNTS}  # type: ignore[arg-type]
 
+    @property
+    def orders(self) -> tuple[float, ...]:
+        """Multiples of rotor speed: of imbalance, and of the rotors' tables."""
+        return self.scenario.cluster.orders
+
     @cached_property
     def frequency(self) -> np.ndarray:
         """(cmg, order) [rad/s]."""
-        return np.outer(self.satellite("isolated").cluster.rotor_speed, ORDERS)
+        return np.outer(self.satellite("isolated").cluster.rotor_speed, self.orders)
 
     @cached_property
     def _at_rest(self) -> dict[str, tuple[dict[str, np.ndarray], Vibration]]:
@@ -109,8 +114,34 @@ class JitterStudy:
     def combined(self, mount: str, output: str = "bus_rate") -> Combined:
         """All rotors and orders together, in the output's unit."""
         values = self.outputs[mount][output]
-        phase = np.outer(self.satellite(mount).cluster.rotor_phase, ORDERS)
-        return combine(values, self.frequency, phase)
+        phase = np.outer(self.satellite(mount).cluster.rotor_phase, self.orders)
+        combined = combine(values, self.frequency, phase)
+        noise = self.noise(mount)
+        return combined if noise is None else combined.with_noise(noise.variance(output, 1)[0])
+
+    def noise(self, mount: str) -> Broadband | None:
+        """Spectra of the answer to the rotors' broadband disturbance; None if there is none.
+
+        Their ``psd`` has a leading axis of one instant, then frequencies and rotors.
+        """
+        return self._noise[mount]
+
+    @cached_property
+    def _noise(self) -> dict[str, Broadband | None]:
+        found: dict[str, Broadband | None] = {}
+        for mount in MOUNTS:
+            satellite, small = self.satellite(mount), self._at_rest[mount][1]
+            found[mount] = None
+            if satellite.disturbance is not None and satellite.disturbance.noisy:
+                modes = np.linalg.eigvals(jax.tree.map(lambda leaf: leaf[0], small).state_matrix())
+                spectra = noise_spectra(satellite, small, modes, NOTHING_SEEN)
+                found[mount] = Broadband(np.zeros(1, int), *spectra)
+        return found
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """What the budget tells apart."""
+        return KINDS[:-1] if self.satellite("isolated").disturbance is None else KINDS
 
     @cached_property
     def budget(self) -> dict[str, np.ndarray]:
@@ -119,7 +150,7 @@ class JitterStudy:
         for mount in MOUNTS:
             variants = imbalance_kinds(self.satellite(mount))
             values = jitter_of_designs(variants, self.gimbal_angle)["bus_rate"]
-            parts[mount] = budget(self.bus_rate(mount), *values)
+            parts[mount] = budget(self.bus_rate(mount), *values)[: len(self.kinds)]
         return parts
 
     def worst(self, mount: str) -> WorstAngles:
@@ -194,7 +225,7 @@ class JitterStudy:
                 **ratio(size["isolated"][j, k], size["rigid"][j, k]),
             }
             for j in range(len(self.gimbal_angle))
-            for k, h in enumerate(ORDERS)
+            for k, h in enumerate(self.orders)
         ]
         together = {mount: self._combined_dict(mount) for mount in MOUNTS}
         envelope = {mount: self.combined(mount).envelope for mount in MOUNTS}
@@ -226,9 +257,9 @@ class JitterStudy:
                             "order": h,
                             "bus_rate_amplitude_deg_s": np.rad2deg(np.abs(part[i, j, k])),
                         }
-                        for i, kind in enumerate(KINDS)
+                        for i, kind in enumerate(self.kinds)
                         for j in range(len(self.gimbal_angle))
-                        for k, h in enumerate(ORDERS)
+                        for k, h in enumerate(self.orders)
                     ]
                     for mount, part in self.budget.items()
                 },
@@ -239,7 +270,14 @@ class JitterStudy:
     def _combined_dict(self, mount: str) -> dict[str, Any]:
         rate, turn = self.combined(mount), self.combined(mount, "bus_attitude")
         kinds = ("envelope", "worst_case", "rss", "rms")
+        noise = self.noise(mount)
+        rms = {
+            output: np.sqrt(noise.variance(output, 1)[0]) if noise else np.zeros(3)
+            for output in ("bus_rate", "bus_attitude")
+        }
         return {
+            "bus_rate_noise_rms_deg_s": np.rad2deg(rms["bus_rate"]),
+            "bus_attitude_noise_rms_arcsec": ARCSEC * rms["bus_attitude"],
             **{f"bus_rate_{kind}_deg_s": np.rad2deg(getattr(rate, kind)) for kind in kinds},
             **{f"bus_attitude_{kind}_arcsec": ARCSEC * getattr(turn, kind) for kind in kinds},
         }

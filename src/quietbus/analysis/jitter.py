@@ -23,7 +23,8 @@ from quietbus.dynamics.vibration import (
     slow_motion,
     vibration,
 )
-from quietbus.model.cmg import ORDERS, ClusterMoments
+from quietbus.model.cmg import ClusterMoments
+from quietbus.model.disturbance import orders_of
 from quietbus.model.guidance import StepGuidance
 from quietbus.model.satellite import Satellite
 
@@ -43,6 +44,21 @@ class Combined:
     worst_case: np.ndarray  # any phases: the sum of all amplitudes
     rss: np.ndarray  # root of the sum of squares of all amplitudes
     rms: np.ndarray  # root mean square in time, phases as given
+
+    def with_lines(self, amplitude: np.ndarray) -> "Combined":
+        """With further lines (..., line, component), each of a frequency of its own."""
+        size = np.abs(amplitude)
+        square = np.sum(size**2, axis=-2)
+        return Combined(
+            envelope=self.envelope + np.sum(size, axis=-2),
+            worst_case=self.worst_case + np.sum(size, axis=-2),
+            rss=np.sqrt(self.rss**2 + square),
+            rms=np.sqrt(self.rms**2 + 0.5 * square),
+        )
+
+    def with_noise(self, square: np.ndarray) -> "Combined":
+        """With noise of a mean square: it has no amplitude, and adds to the RMS alone."""
+        return replace(self, rms=np.sqrt(self.rms**2 + square))
 
 
 def combine(amplitude: np.ndarray, frequency: np.ndarray, phase: np.ndarray) -> Combined:
@@ -102,8 +118,8 @@ def steady_jitter(
     """
     satellite, slow, moments = at_rest(satellite, gimbal_angle)
     small = vibration(satellite, slow, moments, leg_coefficients(satellite, slow))
-    xi = rotor_response(small, moments)
-    s = 1j * moments.rotor_speed[:, None] * jnp.array(ORDERS)
+    xi = rotor_response(satellite, small, moments)
+    s = 1j * moments.rotor_speed[:, None] * orders_of(satellite.disturbance)
     outputs = jax.vmap(jax.vmap(lambda s, x: linear_outputs(satellite, small, s, x, NOTHING_SEEN)))
     return outputs(s, xi), small
 
@@ -113,14 +129,24 @@ def rest_error(small: Vibration) -> float:
     return float(np.max(np.abs(small.slow.u_rate)))
 
 
-KINDS = ("static imbalance", "dynamic imbalance", "installation error", "asymmetry and products")
+KINDS = (
+    "static imbalance",
+    "dynamic imbalance",
+    "installation error",
+    "asymmetry and products",
+    "order tables",
+)
 
 
 def imbalance_kinds(satellite: Satellite) -> list[Satellite]:
     """The satellite with static imbalance only, dynamic only, and both without installation error.
 
-    ``budget`` makes the parts of a budget of their jitter.
+    Last the satellite with all imbalance; none has the rotors' tables. ``budget`` makes the parts
+    of a budget of their jitter.
     """
+    if satellite.disturbance is not None:  # kept, so that all have the same orders
+        none = 0.0 * satellite.disturbance.coefficient
+        satellite = replace(satellite, disturbance=replace(satellite.disturbance, coefficient=none))
     cluster = satellite.cluster
     speed_axes = jnp.broadcast_to(jnp.eye(3), cluster.R_GF.shape)
     inertia = cluster.I_RRcm_R
@@ -135,20 +161,32 @@ def imbalance_kinds(satellite: Satellite) -> list[Satellite]:
             {"R_GF": speed_axes, "I_RRcm_R": even},
             {"R_GF": speed_axes, "I_RRcm_R": products, "eccentricity": none},
             {"R_GF": speed_axes},
+            {},
         )
     ]
 
 
 def budget(
-    whole: np.ndarray, static: np.ndarray, dynamic: np.ndarray, installed_exactly: np.ndarray
+    whole: np.ndarray,
+    static: np.ndarray,
+    dynamic: np.ndarray,
+    installed_exactly: np.ndarray,
+    imbalance: np.ndarray,
 ) -> np.ndarray:
     """Parts of the complex amplitudes by kind (kind, ...), in the order of ``KINDS``.
 
-    Their sum is ``whole``. What the installation error changes is its part; what is left is due to
-    the rotor's unequal transverse inertias and to products of both imbalances.
+    Their sum is ``whole``. What the installation error changes of the imbalance's jitter is its
+    part; what is left of that is due to the rotor's unequal transverse inertias and to products of
+    both imbalances. All beyond imbalance is of the order tables.
     """
     return np.stack(
-        [static, dynamic, whole - installed_exactly, installed_exactly - static - dynamic]
+        [
+            static,
+            dynamic,
+            imbalance - installed_exactly,
+            installed_exactly - static - dynamic,
+            whole - imbalance,
+        ]
     )
 
 

@@ -38,6 +38,7 @@ from quietbus.scenario.base import (
     listing,
 )
 from quietbus.scenario.checks import free_directions, inertia_defect, listed
+from quietbus.scenario.disturbance import Disturbance, GimbalMotor
 from quietbus.scenario.errors import Findings
 
 
@@ -205,6 +206,7 @@ class Rotor(Part):
     dynamic_imbalance_phase: Angle = 0.0  # in the rotor plane, from the static imbalance
     installation_error: InstallationError = InstallationError()
     offset: Vector[Length] = ZERO  # gimbal mass centre to rotor centre; gimbal axes (s, t, g)
+    disturbance: Disturbance | None = None  # beyond the imbalance
 
     @property
     def inertia(self) -> np.ndarray:
@@ -303,6 +305,22 @@ class Cluster(Part):
     gimbal_bandwidth: PositiveAngularVelocity  # of the first-order rate servo
     gimbal_rate_limit: PositiveAngularVelocity | None = None
     gimbal_acceleration_limit: PositiveAngularAcceleration | None = None
+    gimbal_motor: GimbalMotor | None = None  # None: turns the gimbal exactly as its servo says
+
+    @property
+    def orders(self) -> tuple[float, ...]:
+        """Multiples of rotor speed in the run: those of imbalance, 1 and 2, and of all tables."""
+        rotors = (unit.rotor for unit in self.placed() if unit.rotor)
+        tables = (rotor.disturbance.orders for rotor in rotors if rotor.disturbance)
+        found = {line.order for table in tables for line in table or ()} | {1.0, 2.0}
+        whole = all(order.is_integer() for order in found)
+        return tuple(sorted(int(order) if whole else order for order in found))
+
+    @property
+    def seeds(self) -> tuple[int, ...]:
+        """Of the rotors' random phases and noise."""
+        rotors = (unit.rotor for unit in self.placed())
+        return tuple(r.disturbance.seed if r and r.disturbance else 0 for r in rotors)
 
     @property
     def count(self) -> int:
