@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.table import Table
 
+    from quietbus.jitter_study import JitterStudy
     from quietbus.scenario import Scenario
     from quietbus.study import Study
     from quietbus.validate import Check
@@ -397,9 +398,14 @@ def jitter(
         bool, typer.Option("--json", help="Print one JSON object and nothing else; no pictures.")
     ] = False,
     gimbal_angles: AnglesOption = None,
+    max_speed: Annotated[
+        str | None,
+        typer.Option(help="'7000 rpm' of the fastest rotor, end of the sweep; default 1.2 x own."),
+    ] = None,
 ) -> None:
-    """Jitter at each rotor order with the isolator and without, its budget and worst angles."""
+    """Jitter at each rotor order with the isolator and without, and over the rotors' speed."""
     checked = _at_angles(_load(scenario, None, None), gimbal_angles)
+    most = None if max_speed is None else _speed(max_speed)
     if not as_json:
         _make_folder(output)
     _import_heavy()
@@ -409,18 +415,38 @@ def jitter(
         with _status() as tell:
             tell("computing (compiles for some seconds the first time)")
             study = api.jitter(checked)
-            numbers = study.to_dict()
+            numbers = study.to_dict(most)
     except ValueError as error:
         raise _BadInput(f"{scenario}: {error}") from None
     if as_json:
         print(json.dumps(numbers, indent=2, allow_nan=False))
         return
-    from quietbus.plots import jitter_figures
     from quietbus.tables import jitter_tables
 
     for table in jitter_tables(numbers):
         _print(table)
-    _write_study("jitter", numbers, lambda: jitter_figures(study), output)
+    _write_study("jitter", numbers, lambda: _jitter_pictures(study, most), output)
+
+
+def _jitter_pictures(study: JitterStudy, max_speed: float | None) -> dict[str, Figure]:
+    from quietbus.plots import jitter_figures, sweep_figures
+
+    figures = jitter_figures(study)
+    if not study.frequency.any():  # no rotor turns
+        return figures
+    return figures | sweep_figures(study.sweep(max_speed), study.scenario.name)
+
+
+def _speed(text: str) -> float:
+    """A positive angular velocity [rad/s]."""
+    from pydantic_core import PydanticCustomError
+
+    from quietbus.scenario.units import Quantity
+
+    try:
+        return Quantity("an angular velocity", "rad/s", above=0.0).read(text)
+    except PydanticCustomError as error:
+        raise _BadInput(f"--max-speed: {error}") from None
 
 
 @app.command()

@@ -294,6 +294,34 @@ def jitter_tables(numbers: Mapping[str, Any]) -> Iterator[Table]:
             ", ".join(f"{angle:.1f}" for angle in found["gimbal_angle_deg"]),
         )
     yield worst
+    if numbers["sweep"] is not None:
+        yield critical_table(numbers["sweep"])
+
+
+def critical_table(sweep: Mapping[str, Any]) -> Table:
+    """Speeds at which an order that shakes the bus meets a mode, on the platform."""
+    found = sweep["isolated"]["critical_speeds"]
+    most = sweep["speed_rpm"][-1]
+    table = _titled(f"Critical speeds on the platform, gimbals held, up to {most:.5g} rpm")
+    columns = ("speed\nrpm", "order", "frequency\nHz", "damping\n-", "Q\n-", "bus rate\ndeg/s")
+    for column in columns:
+        table.add_column(column, justify="right")
+    table.add_column("mode of the plate", overflow="fold")
+    shown = [critical for critical in found if critical["excited"]]
+    for critical in shown:
+        table.add_row(
+            f"{critical['speed_rpm']:.1f}",
+            f"{critical['order']:g}",
+            f"{critical['frequency_hz']:.3f}",
+            f"{critical['damping']:.3f}",
+            _number(critical["amplification"]),
+            f"{math.hypot(*critical['bus_rate_amplitude_deg_s']):.2e}",
+            critical["mode"].replace("translation", "along").replace("rotation", "about"),
+        )
+    table.caption = "bus rate: norm of the sums of the rotors' amplitudes" if shown else "none"
+    if len(shown) < len(found):
+        table.caption += "; crossings of orders that shake nothing left out"
+    return table
 
 
 def _left(numbers: Mapping[str, Any], axis: int) -> tuple[str, str]:
