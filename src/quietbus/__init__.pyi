@@ -14,7 +14,9 @@ from .results import scenario_of as scenario_of
 from .results import summarize as summarize
 from .scenario import Scenario as Scenario
 from .scenario import ScenarioError as ScenarioError
+from .scenario import WheelTable as WheelTable
 from .scenario import load_scenario as load_scenario
+from .scenario import read_wheel_table as read_wheel_table
 from .solve.harmonic import ResonanceError as ResonanceError
 
 __version__: str

@@ -3,13 +3,16 @@
 from quietbus.scenario.errors import Problem, ScenarioError
 from quietbus.scenario.load import builtin_names, builtin_text, load_scenario, template_text
 from quietbus.scenario.schema import Scenario
+from quietbus.scenario.wheel_files import WheelTable, read_wheel_table
 
 __all__ = [
     "Problem",
     "Scenario",
     "ScenarioError",
+    "WheelTable",
     "builtin_names",
     "builtin_text",
     "load_scenario",
+    "read_wheel_table",
     "template_text",
 ]
