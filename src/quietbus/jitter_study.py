@@ -27,7 +27,6 @@ from quietbus.analysis.jitter import (
 from quietbus.analysis.sweep import SpeedSweep, SpinningModes, critical_speeds
 from quietbus.build import build_satellite
 from quietbus.dynamics.vibration import Vibration
-from quietbus.model.cmg import ORDERS
 from quietbus.model.satellite import Satellite
 from quietbus.scenario import Scenario, ScenarioError
 from quietbus.solve.harmonic import refuse_resonance
@@ -84,10 +83,15 @@ class JitterStudy:
     def _satellites(self) -> dict[str, Satellite]:
         return {mount: build_satellite(self.scenario, mount) for mount in MOUNTS}  # type: ignore[arg-type]
 
+    @property
+    def orders(self) -> tuple[float, ...]:
+        """Multiples of rotor speed: of imbalance, and of the rotors' tables."""
+        return self.scenario.cluster.orders
+
     @cached_property
     def frequency(self) -> np.ndarray:
         """(cmg, order) [rad/s]."""
-        return np.outer(self.satellite("isolated").cluster.rotor_speed, ORDERS)
+        return np.outer(self.satellite("isolated").cluster.rotor_speed, self.orders)
 
     @cached_property
     def _at_rest(self) -> dict[str, tuple[dict[str, np.ndarray], Vibration]]:
@@ -110,8 +114,13 @@ class JitterStudy:
     def combined(self, mount: str, output: str = "bus_rate") -> Combined:
         """All rotors and orders together, in the output's unit."""
         values = self.outputs[mount][output]
-        phase = np.outer(self.satellite(mount).cluster.rotor_phase, ORDERS)
+        phase = np.outer(self.satellite(mount).cluster.rotor_phase, self.orders)
         return combine(values, self.frequency, phase)
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """What the budget tells apart."""
+        return KINDS[:-1] if self.satellite("isolated").disturbance is None else KINDS
 
     @cached_property
     def budget(self) -> dict[str, np.ndarray]:
@@ -120,7 +129,7 @@ class JitterStudy:
         for mount in MOUNTS:
             variants = imbalance_kinds(self.satellite(mount))
             values = jitter_of_designs(variants, self.gimbal_angle)["bus_rate"]
-            parts[mount] = budget(self.bus_rate(mount), *values)
+            parts[mount] = budget(self.bus_rate(mount), *values)[: len(self.kinds)]
         return parts
 
     def worst(self, mount: str) -> WorstAngles:
@@ -249,7 +258,7 @@ class JitterStudy:
                 **ratio(size["isolated"][j, k], size["rigid"][j, k]),
             }
             for j in range(len(self.gimbal_angle))
-            for k, h in enumerate(ORDERS)
+            for k, h in enumerate(self.orders)
         ]
         together = {mount: self._combined_dict(mount) for mount in MOUNTS}
         envelope = {mount: self.combined(mount).envelope for mount in MOUNTS}
@@ -281,9 +290,9 @@ class JitterStudy:
                             "order": h,
                             "bus_rate_amplitude_deg_s": np.rad2deg(np.abs(part[i, j, k])),
                         }
-                        for i, kind in enumerate(KINDS)
+                        for i, kind in enumerate(self.kinds)
                         for j in range(len(self.gimbal_angle))
-                        for k, h in enumerate(ORDERS)
+                        for k, h in enumerate(self.orders)
                     ]
                     for mount, part in self.budget.items()
                 },

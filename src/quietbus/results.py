@@ -16,7 +16,6 @@ from scipy.interpolate import make_interp_spline
 
 from quietbus.analysis.jitter import combine
 from quietbus.analysis.residual import residual, shows
-from quietbus.model.cmg import ORDERS
 from quietbus.scenario import Scenario
 from quietbus.solve.direct import SLOW, Scheme, Solution
 from quietbus.solve.harmonic import TOLERANCES, HarmonicSolution, Jitter
@@ -134,7 +133,11 @@ def to_dataset(
         },
     }
     if jitter is not None:
-        coordinates["order"] = ("order", list(ORDERS), {"long_name": "multiple of rotor speed"})
+        coordinates["order"] = (
+            "order",
+            list(scenario.cluster.orders),
+            {"long_name": "multiple of rotor speed"},
+        )
         for dimension, named in (("point", points), ("line", lines_of_sight)):
             if named:
                 coordinates[dimension] = (dimension, list(named), {"long_name": dimension})
@@ -163,8 +166,8 @@ def to_dataset(
 
 def _jitter_variables(scenario: Scenario, jitter: Jitter) -> dict[str, Any]:
     """Amplitudes, phases and what combines them, of every output that has components."""
-    speed, phase = _rotors(scenario)
-    frequency, angle = np.outer(speed, ORDERS), np.outer(phase, ORDERS)
+    (speed, phase), orders = _rotors(scenario), scenario.cluster.orders
+    frequency, angle = np.outer(speed, orders), np.outer(phase, orders)
     data = {
         "jitter_change_error": _variable(
             jitter.change_error, (), "1", "estimated error of the jitter by the motion's change"
@@ -235,13 +238,14 @@ def reconstruct(
             f"{time[-1]:g} s; got {span:g} s around {around:g} s"
         )
     speed, phase = _rotors(scenario_of(run))
-    fastest = max(ORDERS) * np.max(np.abs(speed)) / (2.0 * np.pi)
+    orders = run["order"].to_numpy()
+    fastest = max(orders) * np.max(np.abs(speed)) / (2.0 * np.pi)
     rate = rate or 40.0 * max(fastest, 1.0)
     first, last = max(time[0], around - span / 2), min(time[-1], around + span / 2)
     t = first + np.arange(int((last - first) * rate) + 1) / rate
     amplitude, shift = (run[f"{name}_jitter_{part}"] for part in ("amplitude", "phase"))
     at = _interpolated(time, amplitude.to_numpy() * np.exp(1j * shift.to_numpy()), t)
-    turn = np.exp(1j * (phase + np.outer(t, speed))[..., None] * np.array(ORDERS))
+    turn = np.exp(1j * (phase + np.outer(t, speed))[..., None] * orders)
     inner = amplitude.dims[3:]
     values = np.sum((at * turn.reshape(*turn.shape, *[1] * len(inner))).real, axis=(1, 2))
     meaning = f"jitter of {JITTER_VARIABLES[name][2]}"

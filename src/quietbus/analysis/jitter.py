@@ -20,7 +20,8 @@ from quietbus.dynamics.vibration import (
     slow_motion,
     vibration,
 )
-from quietbus.model.cmg import ORDERS, ClusterMoments
+from quietbus.model.cmg import ClusterMoments
+from quietbus.model.disturbance import orders_of
 from quietbus.model.guidance import StepGuidance
 from quietbus.model.satellite import Satellite
 
@@ -89,8 +90,8 @@ def steady_jitter(
     moments = ClusterMoments.expand(satellite.cluster)
     slow = slow_motion(satellite, jnp.zeros(()), state, moments.averaged())
     small = vibration(satellite, slow, moments, leg_coefficients(satellite, slow))
-    xi = rotor_response(small, moments)
-    s = 1j * moments.rotor_speed[:, None] * jnp.array(ORDERS)
+    xi = rotor_response(satellite, small, moments)
+    s = 1j * moments.rotor_speed[:, None] * orders_of(satellite.disturbance)
     outputs = jax.vmap(jax.vmap(lambda s, x: linear_outputs(satellite, small, s, x, NOTHING_SEEN)))
     return outputs(s, xi), small
 
@@ -100,14 +101,24 @@ def rest_error(small: Vibration) -> float:
     return float(np.max(np.abs(small.slow.u_rate)))
 
 
-KINDS = ("static imbalance", "dynamic imbalance", "installation error", "asymmetry and products")
+KINDS = (
+    "static imbalance",
+    "dynamic imbalance",
+    "installation error",
+    "asymmetry and products",
+    "order tables",
+)
 
 
 def imbalance_kinds(satellite: Satellite) -> list[Satellite]:
     """The satellite with static imbalance only, dynamic only, and both without installation error.
 
-    ``budget`` makes the parts of a budget of their jitter.
+    Last the satellite with all imbalance; none has the rotors' tables. ``budget`` makes the parts
+    of a budget of their jitter.
     """
+    if satellite.disturbance is not None:  # kept, so that all have the same orders
+        none = 0.0 * satellite.disturbance.coefficient
+        satellite = replace(satellite, disturbance=replace(satellite.disturbance, coefficient=none))
     cluster = satellite.cluster
     speed_axes = jnp.broadcast_to(jnp.eye(3), cluster.R_GF.shape)
     inertia = cluster.I_RRcm_R
@@ -122,20 +133,32 @@ def imbalance_kinds(satellite: Satellite) -> list[Satellite]:
             {"R_GF": speed_axes, "I_RRcm_R": even},
             {"R_GF": speed_axes, "I_RRcm_R": products, "eccentricity": none},
             {"R_GF": speed_axes},
+            {},
         )
     ]
 
 
 def budget(
-    whole: np.ndarray, static: np.ndarray, dynamic: np.ndarray, installed_exactly: np.ndarray
+    whole: np.ndarray,
+    static: np.ndarray,
+    dynamic: np.ndarray,
+    installed_exactly: np.ndarray,
+    imbalance: np.ndarray,
 ) -> np.ndarray:
     """Parts of the complex amplitudes by kind (kind, ...), in the order of ``KINDS``.
 
-    Their sum is ``whole``. What the installation error changes is its part; what is left is due to
-    the rotor's unequal transverse inertias and to products of both imbalances.
+    Their sum is ``whole``. What the installation error changes of the imbalance's jitter is its
+    part; what is left of that is due to the rotor's unequal transverse inertias and to products of
+    both imbalances. All beyond imbalance is of the order tables.
     """
     return np.stack(
-        [static, dynamic, whole - installed_exactly, installed_exactly - static - dynamic]
+        [
+            static,
+            dynamic,
+            imbalance - installed_exactly,
+            installed_exactly - static - dynamic,
+            whole - imbalance,
+        ]
     )
 
 

@@ -32,7 +32,9 @@ from quietbus.dynamics.kinematics import PlateMotion, leg_motion
 from quietbus.dynamics.legs import leg_forces, leg_mass_matrix
 from quietbus.dynamics.state import State
 from quietbus.model.cmg import ORDERS, ClusterMoments
+from quietbus.model.disturbance import on_plate, orders_of
 from quietbus.model.satellite import Satellite
+from quietbus.model.variants import without_disturbance
 from quietbus.spatial.rotation import quaternion_multiply, quaternion_to_matrix, skew
 from quietbus.spatial.vector import cross, dot, rotate, solve_small
 
@@ -51,6 +53,7 @@ def slow_motion(
     satellite: Satellite, t: Float[Array, ""], state: State, averaged: ClusterMoments
 ) -> SlowMotion:
     """The slow motion at time t [s]; ``averaged`` as of ``ClusterMoments.averaged``."""
+    satellite = without_disturbance(satellite)
     signals, a = evaluate(satellite, t, state, jnp.zeros_like(state.gimbal_angle), averaged)
     plates, R_BN = plate_motion(state), quaternion_to_matrix(state.q_NB).T
     vectors = (plates.p_BP, plates.v_B, plates.w_B, plates.v_P, plates.w_P)
@@ -251,6 +254,7 @@ def _control(satellite, slow, moments):
     """Derivatives of what controller, steering and servo decide, and the gimbals' reaction."""
     if satellite.controller is None or satellite.steering is None:
         return None
+    satellite = without_disturbance(satellite)
     state, n = slow.state, len(slow.gimbal[0])
 
     def decide(theta, rate, integral, gamma, gamma_rate):
@@ -281,15 +285,31 @@ def _control(satellite, slow, moments):
     return Control(by[0], by[1], by[2], by[3], by[4], jnp.pad(reactions, ((0, 0), (0, 6), (0, 0))))
 
 
-def rotor_forces(slow: SlowMotion, moments: ClusterMoments) -> Complex[Array, "order cmg 12"]:
+def rotor_forces(
+    satellite: Satellite, slow: SlowMotion, moments: ClusterMoments
+) -> Complex[Array, "order cmg 12"]:
     """Amplitudes of the forces on (v_P, w_P, v_B, w_B) at each order of each rotor."""
     push = jax.vmap(plate_force, (None, 0, None))
-    on_plate = [push(slow.plates, moments.order(h, *slow.gimbal), slow.u_rate[:6]) for h in ORDERS]
-    return jnp.pad(jnp.stack(on_plate), ((0, 0), (0, 0), (0, 6)))
+    imbalance = jnp.stack(
+        [push(slow.plates, moments.order(h, *slow.gimbal), slow.u_rate[:6]) for h in ORDERS]
+    )
+    disturbance = satellite.disturbance
+    if disturbance is not None:
+        lines = disturbance.amplitudes(satellite.cluster, moments.rotor_speed)
+        lines = on_bus(slow, on_plate(satellite.cluster, slow.gimbal[0], lines))
+        at = jnp.array(disturbance.imbalance_at)
+        imbalance = jnp.swapaxes(lines, 0, 1).at[at].add(imbalance)
+    return jnp.pad(imbalance, ((0, 0), (0, 0), (0, 6)))
+
+
+def on_bus(slow: SlowMotion, wrench: Complex[Array, "*n 6"]) -> Complex[Array, "*n 6"]:
+    """Forces and torques on the plate, turned from its axes to those of the bus."""
+    vectors = wrench.reshape(*wrench.shape[:-1], 2, 3)
+    return rotate(slow.plates.R_NP, vectors).reshape(wrench.shape)
 
 
 def rotor_response(
-    small: Vibration, moments: ClusterMoments, one_speed: bool = False
+    satellite: Satellite, small: Vibration, moments: ClusterMoments, one_speed: bool = False
 ) -> Complex[Array, "cmg order 12"]:
     """xi of the steady response to each order of each rotor, Re(xi exp(i h phi)).
 
@@ -303,7 +323,8 @@ def rotor_response(
         standing = s == 0.0  # a rotor that stands still shakes nothing
         return jnp.where(standing, 0.0, small.respond(jnp.where(standing, 1j, s), force))
 
-    forces, h = rotor_forces(small.slow, moments), jnp.array(ORDERS)
+    forces = rotor_forces(satellite, small.slow, moments)
+    h = orders_of(satellite.disturbance)
     if one_speed:
         columns = jnp.swapaxes(forces, 1, 2)
         xi = jax.vmap(respond, (0, None, 0))(h, moments.rotor_speed[0], columns)

@@ -1,5 +1,7 @@
 """A satellite with something taken out of it, for checks and for "what if"."""
 
+from dataclasses import replace
+
 import equinox as eqx
 
 from quietbus.model.satellite import Satellite
@@ -19,6 +21,14 @@ def without_friction(satellite: Satellite) -> Satellite:
     """The satellite with joints that turn freely."""
     joints = lambda s: (s.legs.spherical_friction, s.legs.universal_friction)  # noqa: E731
     return eqx.tree_at(joints, satellite, tuple(0.0 * value for value in joints(satellite)))
+
+
+def without_disturbance(satellite: Satellite) -> Satellite:
+    """The satellite with no disturbance but the rotors' imbalance, gimbal motors running smoothly.
+
+    The harmonic solver's slow motion is that of this one.
+    """
+    return replace(satellite, disturbance=None, motor=None)
 
 
 def without_rotation(satellite: Satellite) -> Satellite:

@@ -30,8 +30,10 @@ from quietbus.dynamics.vibration import (
     slow_motion,
     vibration,
 )
-from quietbus.model.cmg import ORDERS, ClusterMoments
+from quietbus.model.cmg import ClusterMoments
+from quietbus.model.disturbance import orders_of
 from quietbus.model.satellite import Satellite
+from quietbus.model.variants import without_disturbance
 from quietbus.solve.direct import SLOW, Solution, Tolerances, integrate
 from quietbus.spatial.rotation import (
     quaternion_multiply,
@@ -142,20 +144,35 @@ def on_periodic_solution(satellite: Satellite, state: State) -> State:
     first = _motions(satellite, small, xi, satellite.cluster.rotor_phase)
     second = [np.zeros_like(part) for part in first]
     speeds = np.abs(np.asarray(satellite.cluster.rotor_speed))
+    orders = np.asarray(orders_of(satellite.disturbance))
     for speed in np.unique(speeds[speeds > 0.0]):
-        square = _jitter_squared(satellite, state, small, xi, speeds == speed)
-        for part, moved in zip(second, _answer_to_square(small, square, speed), strict=True):
-            part += moved
+        for base, together in _periods(orders):
+            turns = max(TURNS, 4 * round(np.max(orders[together]) / base) + 4)
+            chosen = (speeds == speed)[:, None] & together
+            square = _jitter_squared(satellite, state, small, xi, chosen, base, turns)
+            moved = _answer_to_square(small, square, base * speed)
+            for part, more in zip(second, moved, strict=True):
+                part += more
     return _displaced(state, *map(np.add, first, second))
+
+
+def _periods(orders: np.ndarray) -> list[tuple[float, np.ndarray]]:
+    """Orders that have a common period, by that of the group: the whole ones, each of the others.
+
+    Products of lines of different groups have no mean and are left out.
+    """
+    whole = orders == np.round(orders)
+    return [(1.0, whole), *((float(h), orders == h) for h in orders[~whole])]
 
 
 def _answer_to_square(small: Vibration, square: Sequence[np.ndarray], speed: float):
     """Motion at t = 0, as of ``_motions``, that the jitter's square causes at multiples of speed.
 
     Args:
-        square: over ``TURNS`` angles, accelerations (12,), gimbals' and rate of the integral.
+        square: over a turn's angles, accelerations (12,), gimbals' and rate of the integral.
     """
-    u_rate, gimbal, integral = (np.fft.rfft(part, axis=0) / TURNS for part in square)
+    turns = len(square[0])
+    u_rate, gimbal, integral = (np.fft.rfft(part, axis=0) / turns for part in square)
     T, n, gimbals = small.projection, len(small.M), gimbal.shape[1]
     pushed = u_rate if T is None else u_rate[:, 6:]  # a rigid mount's follow those of the bus
     memory = np.concatenate([0.0 * gimbal, gimbal, integral], axis=1)
@@ -166,7 +183,7 @@ def _answer_to_square(small: Vibration, square: Sequence[np.ndarray], speed: flo
     turning = np.asarray(small.turning)
     pose, pose_rate = np.zeros(12), np.zeros(12)
     moved = np.zeros(memory.shape[1])
-    for m in range(TURNS // 2):
+    for m in range(turns // 2):
         b = np.concatenate([np.zeros(n), pushed[m], memory[m]])
         if m == 0:  # A is singular where nothing holds the satellite
             x = np.linalg.lstsq(A, -b.real, rcond=1e-13)[0]
@@ -216,52 +233,72 @@ def _motions(satellite, small, xi, phase):
 
     over_orders = jax.vmap(one, (0, None, None, 0))
     moved = jax.vmap(over_orders, (None, 0, 0, 0))(
-        jnp.array(ORDERS), satellite.cluster.rotor_speed, phase, xi
+        orders_of(satellite.disturbance), satellite.cluster.rotor_speed, phase, xi
     )
     return tuple(jnp.sum(part.real, axis=(0, 1)) for part in moved)
 
 
 @eqx.filter_jit
-def _jitter_squared(satellite, state, small, xi, same):
-    """What rates have beyond first order in the jitter of some rotors, at ``TURNS`` angles.
+def _jitter_squared(satellite, state, small, xi, chosen, base, turns):
+    """What rates have beyond first order in some lines, at equally spaced angles of a turn.
 
-    Lines of different frequency have no steady product, so that rotors of each speed (``same``)
-    are taken by themselves. Accelerations (12,) are along bus axes.
+    Lines without a common period have no steady product, so that rotors of each speed, and groups
+    of their orders, are taken by themselves. Accelerations (12,) are along bus axes.
+
+    Args:
+        chosen: (cmg, order) which lines.
+        base: the order whose turn it is.
+        turns: number of angles.
     """
+    quiet, orders = without_disturbance(satellite), orders_of(satellite.disturbance)
+    disturbance = satellite.disturbance
+    first = 0 if disturbance is None else disturbance.imbalance_at[0]
+    same = chosen[:, first]  # order 2 is in the group of order 1
+    satellite = _with_lines(quiet, disturbance, chosen)
     moments = ClusterMoments.expand(satellite.cluster)
     averaged = moments.averaged()
     speed, phase = satellite.cluster.rotor_speed, satellite.cluster.rotor_phase
     R_BN = quaternion_to_matrix(state.q_NB).T
-    chosen = lambda all_: all_.at[..., 1:].multiply(same[:, None, None])  # noqa: E731
+    some = lambda all_: all_.at[..., 1:].multiply(same[:, None, None])  # noqa: E731
     kinds = lambda m: (m.c_H, m.J, m.H_gimbal)  # noqa: E731
-    shaking = eqx.tree_at(kinds, moments, tuple(map(chosen, kinds(moments))))
-    xi = jnp.where(same[:, None, None], xi, 0.0)
-    s = 1j * speed[:, None] * jnp.array(ORDERS)
+    shaking = eqx.tree_at(kinds, moments, tuple(map(some, kinds(moments))))
+    xi = jnp.where(chosen[..., None], xi, 0.0)
+    s = 1j * speed[:, None] * orders
     spin = jax.vmap(jax.vmap(lambda s: s * jnp.eye(3) + small.turning))(s)
     xi_rate = jnp.einsum("joab,jocb->joca", spin, xi.reshape(*xi.shape[:2], 4, 3))
     xi_second = jnp.einsum("joab,jocb->joca", spin, xi_rate).reshape(xi.shape)
 
-    def rates(state, phi, moments):
+    def rates(satellite, state, phi, moments):
         signals, a = evaluate(satellite, jnp.zeros(()), state, phi, moments)
         u_rate = jnp.stack([a.v_P, a.w_P, a.v_B, a.w_B]) @ R_BN.T
         return u_rate.reshape(12), signals.gimbal_acceleration, signals.integral_rate
 
     def beyond(turn):
-        phi = phase + turn * jnp.sign(speed)
+        phi = phase + turn / base * jnp.sign(speed)
         now = _motions(satellite, small, xi, phi)
-        true = rates(_displaced(state, *now), phi, shaking)
-        still = rates(state, phi, averaged)
+        true = rates(satellite, _displaced(state, *now), phi, shaking)
+        still = rates(quiet, state, phi, averaged)
         # first order: time derivatives of the motion
-        turned = jnp.exp(1j * phi[:, None] * jnp.array(ORDERS))[..., None]
+        turned = jnp.exp(1j * phi[:, None] * orders)[..., None]
         accelerations = jnp.sum((xi_second * turned).real, axis=(0, 1))
         changing = _motions(satellite, small, xi * s[..., None], phi)
         known = (accelerations, changing[3], changing[4])
         return tuple(t - still_ - k for t, still_, k in zip(true, still, known, strict=True))
 
-    return jax.vmap(beyond)(2.0 * jnp.pi / TURNS * jnp.arange(TURNS))
+    return jax.vmap(beyond)(2.0 * jnp.pi / turns * jnp.arange(turns))
 
 
-TURNS = 16  # angles over which products of orders up to 2 are averaged
+TURNS = 16  # angles at least over which products of orders, up to 2 here, are averaged
+
+
+def _with_lines(quiet, disturbance, chosen):
+    """The satellite with some lines of its rotors' disturbance only, without noise."""
+    if disturbance is None:
+        return quiet
+    coefficient = jnp.where(chosen[..., None], disturbance.coefficient, 0.0)
+    silent = ((None,) * 4,) * len(chosen)
+    lines = replace(disturbance, coefficient=coefficient, broadband=silent, noise=None)
+    return replace(quiet, disturbance=lines)
 
 
 def _displaced(state: State, pose, pose_rate, angle, angle_rate, integral) -> State:
@@ -453,14 +490,14 @@ def _compiled_legs(satellite, t, states):
 def _compiled_chunk(satellite, t, states, legs, view, one_speed):
     moments = ClusterMoments.expand(satellite.cluster)
     averaged = moments.averaged()
-    s = 1j * moments.rotor_speed[:, None] * jnp.array(ORDERS)
+    s = 1j * moments.rotor_speed[:, None] * orders_of(satellite.disturbance)
 
     def one(t, state, row):
         slow = slow_motion(satellite, t, state, averaged)
         example = jax.eval_shape(lambda: leg_coefficients(satellite, slow))
         _, unravel = ravel_pytree(jax.tree.map(lambda leaf: jnp.zeros(leaf.shape), example))
         small = vibration(satellite, slow, moments, unravel(row))
-        xi = rotor_response(small, moments, one_speed)
+        xi = rotor_response(satellite, small, moments, one_speed)
         views = jax.vmap(jax.vmap(lambda s, x: linear_outputs(satellite, small, s, x, view)))
         return views(s, xi), xi, small
 
@@ -484,11 +521,11 @@ def refuse_resonance(satellite: Satellite, where: str, eigenvalues: np.ndarray) 
         eigenvalues: of the controlled satellite [rad/s].
     """
     for j, speed in enumerate(np.asarray(satellite.cluster.rotor_speed)):
-        for h in ORDERS:
+        for h in np.asarray(orders_of(satellite.disturbance)):
             distance = np.min(np.abs(1j * h * speed - eigenvalues))
             if speed != 0.0 and distance < ON_A_MODE * abs(h * speed):
                 raise ResonanceError(
-                    f"order {h} of rotor {j} ({abs(h * speed) / (2 * np.pi):.6g} Hz) lies on an "
+                    f"order {h:g} of rotor {j} ({abs(h * speed) / (2 * np.pi):.6g} Hz) lies on an "
                     f"undamped mode of the satellite {where}: the steady jitter would be "
                     "infinite. Give the struts damping, or change the rotor's speed"
                 )
@@ -507,7 +544,8 @@ def _change_error(satellite, time, bus_rate, gimbal_rates, modes) -> np.ndarray:
         change = np.linalg.norm(np.diff(bus_rate, axis=0), axis=3) / np.diff(time)[:, None, None]
         change = np.maximum(np.append(change, change[-1:], 0), np.append(change[:1], change, 0))
         rate = np.maximum(rate, change / np.maximum(size, 1e-300))
-    s = 1j * np.asarray(satellite.cluster.rotor_speed)[:, None] * np.array(ORDERS)
+    orders = np.asarray(orders_of(satellite.disturbance))
+    s = 1j * np.asarray(satellite.cluster.rotor_speed)[:, None] * orders
     looks = np.array(sorted(modes))
     distances = np.stack([np.min(np.abs(s[..., None] - modes[look]), axis=-1) for look in looks])
     nearest = np.argmin(np.abs(np.arange(len(time))[:, None] - looks), axis=1)
