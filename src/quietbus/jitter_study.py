@@ -167,7 +167,7 @@ class JitterStudy:
         for mount in MOUNTS:
             ends = np.array([0.0, 0.5 * most, most])
             modes[mount] = SpinningModes.between(self._at_speeds(mount, ends)[1], ends)
-            critical[mount] = critical_speeds(modes[mount], own, ORDERS, most)
+            critical[mount] = critical_speeds(modes[mount], own, self.orders, most)
         crossed = [found.factor for each in critical.values() for found in each]
         factor = np.unique(np.append(factor, crossed))
         bus_rate = {}
@@ -176,7 +176,7 @@ class JitterStudy:
             rate[factor == 0.0] = 0.0  # steering by standing rotors has no meaning
             bus_rate[mount] = rate
         phase = np.asarray(self.satellite("isolated").cluster.rotor_phase)
-        return SpeedSweep(factor, own, phase, ORDERS, bus_rate, modes, critical)
+        return SpeedSweep(factor, own, phase, self.orders, bus_rate, modes, critical)
 
     def _at_speeds(
         self, mount: str, factors: np.ndarray
