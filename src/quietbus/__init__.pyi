@@ -1,4 +1,5 @@
 from .analysis.isolator import SingleAxisIsolator as SingleAxisIsolator
+from .analysis.waterfall import FitError as FitError
 from .api import QuietbusWarning as QuietbusWarning
 from .api import SimulationError as SimulationError
 from .api import analyze as analyze
@@ -7,6 +8,10 @@ from .api import jitter as jitter
 from .api import linearize as linearize
 from .api import simulate as simulate
 from .jitter_study import JitterStudy as JitterStudy
+from .measured import MapError as MapError
+from .measured import WaterfallFit as WaterfallFit
+from .measured import fit_waterfall as fit_waterfall
+from .measured import read_waterfall as read_waterfall
 from .results import load_run as load_run
 from .results import reconstruct as reconstruct
 from .results import save_run as save_run

@@ -246,16 +246,15 @@ def _merged(file: Path, rows: Sequence[_Row]) -> tuple[dict[str, Any], ...]:
             )
         same[row.kind] = row
     problems.raise_any()
-    orders = []
+    orders: list[dict[str, Any]] = []
     for (order, backward), by_kind in sorted(lines.items()):
         phases = {kind: row.phase for kind, row in by_kind.items()}
         one = set(phases.values())
-        orders.append(
-            {"order": order}
-            | {kind: row.coefficient for kind, row in by_kind.items()}
-            | ({"whirl": "backward"} if backward else {})
-            | {"phase": one.pop() if len(one) == 1 else phases}
-        )
+        data: dict[str, Any] = {"order": order}
+        data |= {kind: row.coefficient for kind, row in by_kind.items()}
+        if backward:
+            data["whirl"] = "backward"
+        orders.append(data | {"phase": one.pop() if len(one) == 1 else phases})
     return tuple(orders)
 
 
@@ -333,7 +332,7 @@ def _read_s2e_ini(file: Path) -> WheelTable:
             continue
         rows += _read_s2e_csv(_beside(file, wheel[name]), kind, count)
     problems.raise_any()
-    lost = ()
+    lost: tuple[str, ...] = ()
     if wheel.get("considers_structural_resonance", "").upper() in ("ENABLE", "1"):
         lost = (
             "structural resonance at "
