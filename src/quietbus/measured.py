@@ -401,7 +401,7 @@ class WaterfallFit:
         block: dict[str, Any] = {"orders": orders}
         if resonances:
             block["resonances"] = resonances
-        return block | {"broadband": broadband}
+        return _rounded(block | {"broadband": broadband})
 
     def to_yaml(self) -> str:
         """YAML text of the block ``disturbance``, in SI units."""
@@ -424,6 +424,15 @@ class WaterfallFit:
             "frequency": ("frequency", first.frequency, {"units": "Hz"}),
         }
         return xr.Dataset(data, coordinates)
+
+
+def _rounded(data: Any) -> Any:
+    """Six digits, more than any fit is good for, which can be read."""
+    if isinstance(data, dict):
+        return {key: _rounded(value) for key, value in data.items()}
+    if isinstance(data, list):
+        return [_rounded(value) for value in data]
+    return float(f"{data:.6g}") if isinstance(data, float) else data
 
 
 def fit_waterfall(maps: xr.Dataset | str | os.PathLike[str], most: int = 20) -> WaterfallFit:

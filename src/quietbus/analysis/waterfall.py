@@ -311,7 +311,7 @@ class _Floor:
         hats = np.array([np.interp(x, nodes, unit) for unit in np.eye(len(nodes))]).T
         weight = np.sqrt(count[use])[:, None]
         values = np.linalg.lstsq(weight * hats, weight[:, 0] * mean, rcond=None)[0] + offset
-        self.frequency, self.psd = np.exp(nodes), np.exp(values)
+        self.frequency, self.psd = measured.frequency[use][at], np.exp(values)
         positive = np.maximum(measured.frequency, self.frequency[0])
         level = np.interp(np.log(positive), nodes, values)
         self.at_bins = np.exp(level) * passed * np.ones(measured.psd.shape)  # (n, m)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 RPM = 30.0 / np.pi
 RESIDUAL = 10.0  # [dB] at the ends of the residual's colours
 DECADES = 7.0  # of power that colours tell apart
+COLUMNS = 256  # of a map
 NAMED = 8  # orders named on their rays; more would cover the map
 
 
@@ -35,21 +36,23 @@ def waterfall_figures(fitted: WaterfallFit) -> dict[str, Figure]:
 def maps(fitted: ComponentFit) -> Figure:
     """Measured and fitted power spectral density and their ratio, over frequency and speed."""
     measured = fitted.measured
-    said = measured.component.replace("_", " ")
+    step, said = measured.bin, measured.component.replace("_", " ")
     figure = new_figure(4.3, f"Waterfall of the {said}: measured, fitted, residual")
     panels = figure.subplots(1, 3, sharex=True, sharey=True)
     highest = float(measured.psd.max())
     least = max(float(fitted.fitted.min()), highest * 10.0**-DECADES)
     powers = LogNorm(0.5 * least, highest)
+    sums = (_pooled(psd, np.add) for psd in (measured.psd, fitted.fitted))
+    residual = 10.0 * np.log10(np.maximum(next(sums), 0.1 * least) / next(sums))
     decibels = Normalize(-RESIDUAL, RESIDUAL)
     unit = "N²/Hz" if measured.component.endswith("force") else "N²m²/Hz"
     for axes, title, values, norm, colours in (
-        (panels[0], "measured", measured.psd, powers, "viridis"),
-        (panels[1], "fitted", fitted.fitted, powers, "viridis"),
-        (panels[2], "measured over fitted", fitted.residual_db, decibels, "RdBu_r"),
+        (panels[0], "measured", _pooled(measured.psd, np.maximum), powers, "viridis"),
+        (panels[1], "fitted", _pooled(fitted.fitted, np.maximum), powers, "viridis"),
+        (panels[2], "measured over fitted", residual, decibels, "RdBu_r"),
     ):
         mesh = axes.pcolormesh(
-            measured.frequency,
+            measured.frequency[:: _pool(measured.psd)] + 0.5 * (_pool(measured.psd) - 1) * step,
             RPM * measured.speed,
             np.maximum(values, 0.5 * least) if norm is powers else values,
             norm=norm,
@@ -73,8 +76,17 @@ def maps(fitted: ComponentFit) -> Figure:
         ylim=(RPM * measured.speed[0], RPM * measured.speed[-1]),
     )
     if fitted.mode is not None:
-        panels[1].legend(loc="upper left", fontsize=8, labelcolor="white")
+        panels[1].legend(loc="lower right", fontsize=8, labelcolor="white")
     return figure
+
+
+def _pool(values: np.ndarray) -> int:
+    """Bins that share a column of the picture, so that no line falls between two dots."""
+    return max(1, -(-values.shape[1] // COLUMNS))
+
+
+def _pooled(values: np.ndarray, how: np.ufunc) -> np.ndarray:
+    return how.reduceat(values, np.arange(0, values.shape[1], _pool(values)), axis=1)
 
 
 def _overlay(axes: Axes, fitted: ComponentFit) -> None:
