@@ -17,10 +17,12 @@ from quietbus.dynamics.linearize import Actuator, LinearModel, OperatingPoint
 from quietbus.dynamics.linearize import linearize as linearize_satellite
 from quietbus.dynamics.vibration import View
 from quietbus.jitter_study import JitterStudy
+from quietbus.resolution import refuse_coarse_output, refuse_coarse_tolerance, ripple_unseen
 from quietbus.results import aliasing, to_dataset
 from quietbus.scenario import Scenario, load_scenario
 from quietbus.solve.direct import Scheme, Tolerances, integrate
 from quietbus.solve.harmonic import integrate_harmonic, on_periodic_solution
+from quietbus.solve.noise import with_noise
 from quietbus.study import Study
 
 Mount = Literal["isolated", "rigid"]
@@ -73,10 +75,12 @@ def simulate(
         ``status`` "interrupted" among its attributes, and a QuietbusWarning is given.
 
     Raises:
-        ScenarioError: the scenario is not valid.
+        ScenarioError: the scenario is not valid, or the output rate or tolerance of a direct run
+            is too coarse for a declared disturbance.
         ValueError: an unknown method or mount.
         ResonanceError: an order of a rotor lies on an undamped mode (harmonic).
-        SimulationError: the run diverged; what was computed until then is in its ``run``.
+        SimulationError: the run diverged, or its output rate could not show the gimbal motors'
+            ripple; what was computed until then is in its ``run``.
         KeyboardInterrupt: Ctrl-C before anything was computed.
     """
     if method not in METHODS:
@@ -90,12 +94,17 @@ def simulate(
         if points or lines_of_sight:
             raise ValueError("points and lines_of_sight need method 'harmonic'")
         scenario = _as_run(scenario, mount, duration, output_rate)
+        refuse_coarse_output(scenario)
         notes = tuple(filter(None, [aliasing(scenario)]))
         run = _direct(scenario, joint_forces, progress)
     for note in notes:
         warnings.warn(note, QuietbusWarning, stacklevel=2)
     if run.attrs["status"] == "stopped":
         raise SimulationError(run.attrs["stop_reason"], run)
+    if method == "direct":
+        unseen = ripple_unseen(scenario, run["gimbal_rate"].to_numpy())
+        if unseen:
+            raise SimulationError(unseen, run)
     if run.attrs["status"] == "interrupted":
         warnings.warn(run.attrs["stop_reason"], QuietbusWarning, stacklevel=2)
     return run
@@ -127,6 +136,7 @@ def compare(
 
         return _direct(_as_run(scenario, mount, duration), False, tell)
 
+    refuse_coarse_output(_as_run(scenario, None, duration))
     warning = aliasing(_as_run(scenario, None, duration))
     if warning:
         warnings.warn(warning, QuietbusWarning, stacklevel=2)
@@ -136,7 +146,14 @@ def compare(
             concurrent.futures.wait(futures.values())
         except KeyboardInterrupt:
             stop.set()
-        return {mount: future.result() for mount, future in futures.items()}
+        runs: dict[str, xr.Dataset] = {}
+        for mount, future in futures.items():
+            runs[mount] = future.result()
+    for name, done in runs.items():
+        unseen = ripple_unseen(_as_run(scenario, None, duration), done["gimbal_rate"].to_numpy())
+        if unseen:
+            warnings.warn(f"{name}: {unseen}", QuietbusWarning, stacklevel=2)
+    return runs
 
 
 def analyze(scenario: Scenario | str, gimbal_angle: ArrayLike | None = None) -> Study:
@@ -261,10 +278,11 @@ def _direct(
     satellite = build_satellite(scenario)
     settings = scenario.simulation
     state = build_initial_state(scenario, satellite)
+    refuse_coarse_tolerance(scenario, satellite, state)
     if scenario.initial.steady:
         state = on_periodic_solution(satellite, state)
     solution = integrate(
-        satellite,
+        with_noise(satellite, scenario.cluster.seeds, settings.duration),
         state,
         settings.duration,
         settings.output_rate,

@@ -184,8 +184,8 @@ def _disturbance(cluster: scenario_hardware.Cluster) -> Disturbance | None:
         if own is None:
             continue
         # drawn for all lines, whether random or not, so that a phase given changes no other
-        drawn = np.random.default_rng([own.seed, j])
-        drawn = drawn.uniform(-np.pi, np.pi, (len(own.orders or ()), len(CHANNELS)))
+        generator = np.random.default_rng([own.seed, j])
+        drawn = generator.uniform(-np.pi, np.pi, (len(own.orders or ()), len(CHANNELS)))
         for line, any_phase in zip(own.orders or (), drawn, strict=True):
             k = orders.index(line.order)
             for name, channels in _COMPONENTS.items():

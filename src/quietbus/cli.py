@@ -167,6 +167,7 @@ def simulate(
         raise _BadInput("--joint-forces needs --method direct")
     if joint_forces and chosen == Mount.rigid:
         raise _BadInput("--joint-forces needs the isolated mount: a rigid one leaves them open")
+    failed = ""
     with _keeping_results():
         with _progress({chosen: checked.simulation.duration}) as tell, _notes():
             try:
@@ -178,7 +179,7 @@ def simulate(
                     progress=lambda t: tell(chosen, t),
                 )
             except api.SimulationError as error:
-                run = error.run
+                run, failed = error.run, str(error)
             except ResonanceError as error:
                 raise _BadInput(f"{scenario}: {error}") from None
         troubles = _save(run, output)
@@ -188,6 +189,8 @@ def simulate(
         print("one instant only, so there is no table")
     if run.attrs["status"] != "complete":
         troubles.append(f"the run is not complete: {run.attrs['stop_reason']}")
+    elif failed:
+        troubles.append(failed)
     if troubles:
         _fail("; ".join(troubles))
 

@@ -26,10 +26,11 @@ from quietbus.analysis.jitter import (
 )
 from quietbus.analysis.sweep import SpeedSweep, SpinningModes, critical_speeds
 from quietbus.build import build_satellite
-from quietbus.dynamics.vibration import Vibration
+from quietbus.dynamics.vibration import NOTHING_SEEN, Vibration
 from quietbus.model.satellite import Satellite
 from quietbus.scenario import Scenario, ScenarioError
 from quietbus.solve.harmonic import refuse_resonance
+from quietbus.solve.noise import Broadband, noise_spectra
 
 MOUNTS = ("isolated", "rigid")
 SWEPT = 1.2  # times the rotors' own speed: where a sweep ends unless told otherwise
@@ -115,7 +116,28 @@ class JitterStudy:
         """All rotors and orders together, in the output's unit."""
         values = self.outputs[mount][output]
         phase = np.outer(self.satellite(mount).cluster.rotor_phase, self.orders)
-        return combine(values, self.frequency, phase)
+        combined = combine(values, self.frequency, phase)
+        noise = self.noise(mount)
+        return combined if noise is None else combined.with_noise(noise.variance(output, 1)[0])
+
+    def noise(self, mount: str) -> Broadband | None:
+        """Spectra of the answer to the rotors' broadband disturbance; None if there is none.
+
+        Their ``psd`` has a leading axis of one instant, then frequencies and rotors.
+        """
+        return self._noise[mount]
+
+    @cached_property
+    def _noise(self) -> dict[str, Broadband | None]:
+        found: dict[str, Broadband | None] = {}
+        for mount in MOUNTS:
+            satellite, small = self.satellite(mount), self._at_rest[mount][1]
+            found[mount] = None
+            if satellite.disturbance is not None and satellite.disturbance.noisy:
+                modes = np.linalg.eigvals(jax.tree.map(lambda leaf: leaf[0], small).state_matrix())
+                spectra = noise_spectra(satellite, small, modes, NOTHING_SEEN)
+                found[mount] = Broadband(np.zeros(1, int), *spectra)
+        return found
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -304,7 +326,14 @@ class JitterStudy:
     def _combined_dict(self, mount: str) -> dict[str, Any]:
         rate, turn = self.combined(mount), self.combined(mount, "bus_attitude")
         kinds = ("envelope", "worst_case", "rss", "rms")
+        noise = self.noise(mount)
+        rms = {
+            output: np.sqrt(noise.variance(output, 1)[0]) if noise else np.zeros(3)
+            for output in ("bus_rate", "bus_attitude")
+        }
         return {
+            "bus_rate_noise_rms_deg_s": np.rad2deg(rms["bus_rate"]),
+            "bus_attitude_noise_rms_arcsec": ARCSEC * rms["bus_attitude"],
             **{f"bus_rate_{kind}_deg_s": np.rad2deg(getattr(rate, kind)) for kind in kinds},
             **{f"bus_attitude_{kind}_arcsec": ARCSEC * getattr(turn, kind) for kind in kinds},
         }

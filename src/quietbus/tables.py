@@ -254,12 +254,15 @@ def jitter_tables(numbers: Mapping[str, Any]) -> Iterator[Table]:
     together = _titled("All rotors and orders together")
     for column in ("", "axis", "unit", "isolated", "rigid", "left", "dB"):
         together.add_column(column, justify="right" if column not in ("", "axis") else "left")
-    for title, key in (
+    rows = [
         ("envelope, phases as given", "envelope"),
         ("worst case, any phases", "worst_case"),
         ("root sum of squares", "rss"),
         ("RMS, phases as given", "rms"),
-    ):
+    ]
+    if any(max(combined[m]["bus_rate_noise_rms_deg_s"]) for m in ("isolated", "rigid")):
+        rows.append(("RMS of noise alone", "noise_rms"))
+    for title, key in rows:
         for name, unit in (("bus_rate", "deg_s"), ("bus_attitude", "arcsec")):
             for i, axis in enumerate(AXES):
                 values = [combined[m][f"{name}_{key}_{unit}"][i] for m in ("isolated", "rigid")]

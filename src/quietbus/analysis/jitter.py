@@ -40,6 +40,21 @@ class Combined:
     rss: np.ndarray  # root of the sum of squares of all amplitudes
     rms: np.ndarray  # root mean square in time, phases as given
 
+    def with_lines(self, amplitude: np.ndarray) -> "Combined":
+        """With further lines (..., line, component), each of a frequency of its own."""
+        size = np.abs(amplitude)
+        square = np.sum(size**2, axis=-2)
+        return Combined(
+            envelope=self.envelope + np.sum(size, axis=-2),
+            worst_case=self.worst_case + np.sum(size, axis=-2),
+            rss=np.sqrt(self.rss**2 + square),
+            rms=np.sqrt(self.rms**2 + 0.5 * square),
+        )
+
+    def with_noise(self, square: np.ndarray) -> "Combined":
+        """With noise of a mean square: it has no amplitude, and adds to the RMS alone."""
+        return replace(self, rms=np.sqrt(self.rms**2 + square))
+
 
 def combine(amplitude: np.ndarray, frequency: np.ndarray, phase: np.ndarray) -> Combined:
     """Combine lines.

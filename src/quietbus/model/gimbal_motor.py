@@ -6,6 +6,7 @@ what its servo asks for, and depend on the gimbal's rate: a gimbal at rest is no
 """
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Complex, Float
 
@@ -47,6 +48,21 @@ class GimbalMotor(eqx.Module):
         oscillator = self.step_frequency**2 + 2.0 * self.step_damping * self.step_frequency * s
         follows = self.step_frequency**2 / (oscillator + s**2)
         return jnp.concatenate([ripple, -1j * self.step_turn * s**2 * follows], axis=1)
+
+    def modulation(
+        self,
+        cluster: ControlMomentGyro,
+        gamma_rate: Float[Array, "n cmg"],
+        bandwidth: Float[Array, ""],
+    ) -> Float[Array, "n cmg line"]:
+        """Amplitude [rad] by which each line shifts its own phase n gamma, through the servo.
+
+        Small where the lines follow from the mean motion of the gimbal alone.
+        """
+        pushed = jax.vmap(lambda rate: jnp.abs(self.amplitudes(cluster, rate)))(gamma_rate)
+        omega = jnp.abs(self.order * gamma_rate[..., None])
+        answer = omega * jnp.sqrt(omega**2 + bandwidth**2)
+        return self.order * pushed / jnp.where(omega > 0.0, answer, 1.0)
 
     def acceleration(
         self,

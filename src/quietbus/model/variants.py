@@ -31,6 +31,16 @@ def without_disturbance(satellite: Satellite) -> Satellite:
     return replace(satellite, disturbance=None, motor=None)
 
 
+def without_noise(satellite: Satellite) -> Satellite:
+    """The satellite without broadband disturbance: with the lines of its rotors alone."""
+    if satellite.disturbance is None:
+        return satellite
+    silent = ((None,) * 4,) * len(satellite.disturbance.broadband)
+    return replace(
+        satellite, disturbance=replace(satellite.disturbance, broadband=silent, noise=None)
+    )
+
+
 def without_rotation(satellite: Satellite) -> Satellite:
     """The satellite with its rotors at a standstill."""
     speed = lambda s: s.cluster.rotor_speed  # noqa: E731

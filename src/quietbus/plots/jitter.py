@@ -31,7 +31,10 @@ CROWDED = 12  # names side by side; more are turned
 def jitter_figures(study: JitterStudy) -> dict[str, Figure]:
     """All pictures of a study by name; without jitter they say so."""
     with style():
-        return {"spectrum": spectrum(study), "budget": budget(study), "worst": worst(study)}
+        figures = {"spectrum": spectrum(study), "budget": budget(study), "worst": worst(study)}
+        if study.noise("isolated") is not None:
+            figures["noise"] = noise(study)
+        return figures
 
 
 def spectrum(study: JitterStudy) -> Figure:
@@ -201,6 +204,24 @@ def budget(study: JitterStudy) -> Figure:
         title_fontsize=8,
         alignment="left",
     )
+    return figure
+
+
+def noise(study: JitterStudy) -> Figure:
+    """Spectral density of the bus rate by the rotors' broadband disturbance, on both mounts."""
+    figure = new_figure(5.6, f"Bus rate by broadband disturbance ({study.scenario.name})")
+    panels = figure.subplots(3, 1, sharex=True, sharey=True)
+    for mount, (label, look) in LINES.items():
+        spectra = study.noise(mount)
+        assert spectra is not None
+        density = np.rad2deg(np.sqrt(spectra.psd["bus_rate"][0].sum(axis=1)))
+        rms = np.rad2deg(np.sqrt(spectra.variance("bus_rate", 1)[0]))
+        for i, axes in enumerate(panels):
+            said = f"{label}, RMS {rms[i]:.3g} deg/s"
+            axes.loglog(spectra.frequency, density[:, i], **{**look, "label": said})
+            axes.set_ylabel(f"about {AXES[i]}\n[deg/s/√Hz]")
+            axes.legend(loc="best")
+    panels[-1].set_xlabel("frequency [Hz]")
     return figure
 
 

@@ -84,6 +84,11 @@ class Order(Part):
         Discriminator(_phase_form),
     ] = 0.0
 
+    @property
+    def acts(self) -> bool:
+        """Whether any coefficient is not zero."""
+        return any(getattr(self, component) > 0.0 for component in COMPONENTS)
+
     def phase_of(self, component: str) -> float | Literal["random"]:
         """Phase [rad] of one of ``COMPONENTS``, against order times rotor angle."""
         if isinstance(self.phase, Phases):
@@ -262,6 +267,16 @@ class GimbalMotor(Part):
     stepping: Stepping | None = None
     # [rad/s] ripple slower than this is held by the motor; None: a tenth of the servo's bandwidth
     holding_bandwidth: PositiveAngularVelocity | None = None
+
+    @property
+    def lines(self) -> tuple[int, ...]:
+        """Multiples of the gimbal angle: those of ripple, then those of steps."""
+        steps = self.stepping
+        harmonics = range(1, steps.harmonics + 1) if steps else ()
+        return (
+            *(ripple.per_turn for ripple in self.ripple or ()),
+            *(k * steps.steps_per_turn for k in harmonics if steps),
+        )
 
     @model_validator(mode="after")
     def _check(self) -> Self:

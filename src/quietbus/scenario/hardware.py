@@ -317,6 +317,12 @@ class Cluster(Part):
         return tuple(sorted(int(order) if whole else order for order in found))
 
     @property
+    def seeds(self) -> tuple[int, ...]:
+        """Of the rotors' random phases and noise."""
+        rotors = (unit.rotor for unit in self.placed())
+        return tuple(r.disturbance.seed if r and r.disturbance else 0 for r in rotors)
+
+    @property
     def count(self) -> int:
         """Number of CMGs."""
         if self.pyramid is not None:

@@ -19,6 +19,7 @@ from jax.flatten_util import ravel_pytree
 from scipy.spatial.transform import Rotation
 
 from quietbus.dynamics.closed_loop import evaluate
+from quietbus.dynamics.disturbance_response import ripple_lines
 from quietbus.dynamics.state import State
 from quietbus.dynamics.vibration import (
     NOTHING_SEEN,
@@ -33,8 +34,9 @@ from quietbus.dynamics.vibration import (
 from quietbus.model.cmg import ClusterMoments
 from quietbus.model.disturbance import orders_of
 from quietbus.model.satellite import Satellite
-from quietbus.model.variants import without_disturbance
+from quietbus.model.variants import without_disturbance, without_noise
 from quietbus.solve.direct import SLOW, Solution, Tolerances, integrate
+from quietbus.solve.noise import Broadband, noise_spectra
 from quietbus.spatial.rotation import (
     quaternion_multiply,
     quaternion_to_matrix,
@@ -66,6 +68,9 @@ class Jitter:
     amplitudes: dict[str, np.ndarray]  # (n, cmg, order, ...) by output, complex
     change_error: np.ndarray  # (n,) estimated relative error of the assumption of slow change
     warnings: tuple[str, ...]
+    # by gimbal motors, (n, cmg, line, ...); the phase is against line times gimbal angle
+    ripple: dict[str, np.ndarray] | None = None
+    broadband: Broadband | None = None
 
 
 @dataclass(frozen=True)
@@ -149,7 +154,7 @@ def on_periodic_solution(satellite: Satellite, state: State) -> State:
         for base, together in _periods(orders):
             turns = max(TURNS, 4 * round(np.max(orders[together]) / base) + 4)
             chosen = (speeds == speed)[:, None] & together
-            square = _jitter_squared(satellite, state, small, xi, chosen, base, turns)
+            square = _jitter_squared(satellite, state, small, xi, chosen, jnp.asarray(base), turns)
             moved = _answer_to_square(small, square, base * speed)
             for part, more in zip(second, moved, strict=True):
                 part += more
@@ -196,6 +201,15 @@ def _answer_to_square(small: Vibration, square: Sequence[np.ndarray], speed: flo
     if small.control is None:
         moved = np.zeros(2 * gimbals + 3)
     return pose, pose_rate, *np.split(moved, [gimbals, 2 * gimbals])
+
+
+def steady_speeds(satellite: Satellite, state: State) -> np.ndarray:
+    """Amplitudes (cmg, order, 6) of the bus's velocity [m/s] and rate [rad/s] at t = 0."""
+    states = jax.tree.map(lambda leaf: np.asarray(leaf)[None], state)
+    _, xi, _ = _Along(satellite, np.zeros(1), states).chunk(np.zeros(1, int), NOTHING_SEEN)
+    orders = np.asarray(orders_of(satellite.disturbance))
+    speed = np.abs(np.outer(np.asarray(satellite.cluster.rotor_speed), orders))
+    return speed[..., None] * np.abs(xi[0, ..., 6:])
 
 
 def without_jitter(satellite: Satellite, state: State) -> State:
@@ -296,9 +310,8 @@ def _with_lines(quiet, disturbance, chosen):
     if disturbance is None:
         return quiet
     coefficient = jnp.where(chosen[..., None], disturbance.coefficient, 0.0)
-    silent = ((None,) * 4,) * len(chosen)
-    lines = replace(disturbance, coefficient=coefficient, broadband=silent, noise=None)
-    return replace(quiet, disturbance=lines)
+    lines = replace(disturbance, coefficient=coefficient)
+    return without_noise(replace(quiet, disturbance=lines))
 
 
 def _displaced(state: State, pose, pose_rate, angle, angle_rate, integral) -> State:
@@ -344,6 +357,8 @@ def respond(
     """
     along = _Along(satellite, time, states)
     amplitudes: dict[str, np.ndarray] = {}
+    ripple: list[dict[str, np.ndarray]] = []
+    looked: dict[int, Vibration] = {}
     looks = np.unique(np.linspace(0, len(time) - 1, LOOKS).astype(int))
     modes: dict[int, np.ndarray] = {}
     done = 0
@@ -357,6 +372,10 @@ def respond(
                 )
                 whole[these] = value
             modes |= _eigenvalues(small, start, np.intersect1d(looks, these))
+            if satellite.motor is not None:
+                ripple.append(jax.tree.map(np.asarray, ripple_lines(satellite, small, view)))
+            for look in np.intersect1d(looks, these):
+                looked[int(look)] = _instant(small, int(look) - start)
             done = int(these[-1]) + 1
             if progress is not None:
                 progress(float(time[done - 1]))
@@ -364,6 +383,9 @@ def respond(
         if not done:
             raise
     amplitudes = {name: value[:done] for name, value in amplitudes.items()}
+    ripples = None
+    if ripple:
+        ripples = {name: np.concatenate([part[name] for part in ripple]) for name in ripple[0]}
     for look, eigenvalues in modes.items():
         refuse_resonance(satellite, f"at t = {time[look]:g} s", eigenvalues)
     rates = np.abs(np.asarray(states.gimbal_rate))[:done]
@@ -380,7 +402,32 @@ def respond(
     growing = _growing(last, 1.0 / max(float(time[-1]), 1e-9))
     if growing:
         said.append(f"the slow motion is unstable: {growing}")
-    return Jitter(amplitudes, error, tuple(said)), done
+    if satellite.motor is not None:
+        index = satellite.motor.modulation(
+            satellite.cluster, jnp.asarray(states.gimbal_rate)[:done], satellite.servo.bandwidth
+        )
+        if np.max(index) > SLOW_CHANGE:
+            said.append(
+                f"the gimbal motors' ripple turns the gimbals by up to {np.max(index):.2g} rad of "
+                "its own phase: the jitter that it causes may be wrong by as much (above "
+                f"{SLOW_CHANGE:g} rad use method 'direct')"
+            )
+    noise = _broadband(satellite, looked, modes, view)
+    return Jitter(amplitudes, error, tuple(said), ripples, noise), done
+
+
+def _broadband(satellite, looked, modes, view) -> Broadband | None:
+    """Spectra of the response to noise at the looks, if there is noise."""
+    if satellite.disturbance is None or not satellite.disturbance.noisy:
+        return None
+    instants = np.array(sorted(looked))
+    small = jax.tree.map(lambda *each: np.stack(each), *(looked[k] for k in instants.tolist()))
+    eigenvalues = np.concatenate([modes[k] for k in instants.tolist()])
+    return Broadband(instants, *noise_spectra(satellite, small, eigenvalues, view))
+
+
+def _instant(small: Vibration, k: int) -> Vibration:
+    return jax.tree.map(lambda leaf: leaf[k], small)
 
 
 Chunk = tuple[dict[str, np.ndarray], np.ndarray, Vibration]
@@ -508,8 +555,7 @@ def _eigenvalues(small: Vibration, start: int, looks: np.ndarray) -> dict[int, n
     """Eigenvalues [rad/s] of the controlled satellite at instants of a chunk."""
     if not looks.size:
         return {}
-    at = lambda look: jax.tree.map(lambda leaf: leaf[look - start], small)  # noqa: E731
-    matrices = np.stack([at(look).state_matrix() for look in looks])
+    matrices = np.stack([_instant(small, look - start).state_matrix() for look in looks])
     return dict(zip(looks.tolist(), np.linalg.eigvals(matrices), strict=True))
 
 
