@@ -26,6 +26,7 @@ from quietbus.analysis.jitter import (
     steady_jitter,
     worst_angles,
 )
+from quietbus.analysis.sweep import SpeedSweep, SpinningModes, critical_speeds
 from quietbus.build import build_satellite
 from quietbus.dynamics.vibration import NOTHING_SEEN, Vibration
 from quietbus.model.satellite import Satellite
@@ -34,6 +35,7 @@ from quietbus.solve.harmonic import refuse_resonance
 from quietbus.solve.noise import Broadband, noise_spectra
 
 MOUNTS = ("isolated", "rigid")
+SWEPT = 1.2  # times the rotors' own speed: where a sweep ends unless told otherwise
 ARCSEC = np.rad2deg(1.0) * 3600.0
 # differences of the scenario's algebra: offsets in steps and weights
 _CENTRAL: tuple[tuple[int, ...], np.ndarray] = (
@@ -161,6 +163,56 @@ class JitterStudy:
             len(self.gimbal_angle),
         )
 
+    def sweep(self, max_speed: float | None = None, count: int = 256) -> SpeedSweep:
+        """Jitter and modes as the speed of all rotors rises together from rest.
+
+        Args:
+            max_speed: [rad/s] of the fastest rotor; by default 1.2 times its own.
+            count: of the speeds, close to each other near rest; the rotors' own and the critical
+                speeds are added.
+
+        Raises:
+            ValueError: no rotor turns, or the speed is not positive.
+        """
+        own = np.asarray(self.satellite("isolated").cluster.rotor_speed)
+        fastest = float(np.max(np.abs(own)))
+        if fastest == 0.0:
+            raise ValueError("a sweep of the rotors' speed needs one that turns")
+        most = SWEPT if max_speed is None else max_speed / fastest
+        if not (np.isfinite(most) and most > 0.0 and count >= 2):
+            raise ValueError(
+                "expected a positive max_speed in rad/s and two speeds or more; got "
+                f"{max_speed} and {count}"
+            )
+        factor = np.append(np.geomspace(1e-3, 1.0, count // 2), np.linspace(0, 1, count // 2 + 1))
+        factor = np.unique(np.append(most * factor, 1.0 if most >= 1.0 else most))
+        modes, critical = {}, {}
+        for mount in MOUNTS:
+            ends = np.array([0.0, 0.5 * most, most])
+            modes[mount] = SpinningModes.between(self._at_speeds(mount, ends)[1], ends)
+            critical[mount] = critical_speeds(modes[mount], own, self.orders, most)
+        crossed = [found.factor for each in critical.values() for found in each]
+        factor = np.unique(np.append(factor, crossed))
+        bus_rate = {}
+        for mount in MOUNTS:
+            rate = self._at_speeds(mount, factor)[0]["bus_rate"]
+            rate[factor == 0.0] = 0.0  # steering by standing rotors has no meaning
+            bus_rate[mount] = rate
+        phase = np.asarray(self.satellite("isolated").cluster.rotor_phase)
+        return SpeedSweep(factor, own, phase, self.orders, bus_rate, modes, critical)
+
+    def _at_speeds(
+        self, mount: str, factors: np.ndarray
+    ) -> tuple[dict[str, np.ndarray], Vibration]:
+        own = self.satellite(mount)
+        designs = [
+            eqx.tree_at(lambda s: s.cluster.rotor_speed, own, factor * own.cluster.rotor_speed)
+            for factor in factors
+        ]
+        return _compute(
+            designs, np.broadcast_to(self.gimbal_angle, (len(designs), len(self.gimbal_angle)))
+        )
+
     def derivative(
         self, paths: Sequence[str], mount: str, output: str = "bus_rate"
     ) -> dict[str, np.ndarray]:
@@ -204,8 +256,12 @@ class JitterStudy:
             *built,
         )
 
-    def to_dict(self) -> dict[str, Any]:
-        """For JSON, with the keys of the interface; see docs/jitter.md."""
+    def to_dict(self, max_speed: float | None = None) -> dict[str, Any]:
+        """For JSON, with the keys of the interface; see docs/jitter.md.
+
+        Args:
+            max_speed: where the sweep ends, as of ``sweep``; there is none if no rotor turns.
+        """
         own = self.scenario.isolator.mount
         size = {mount: np.abs(self.bus_rate(mount)) for mount in MOUNTS}
         turn = {mount: np.abs(self.outputs[mount]["bus_attitude"]) for mount in MOUNTS}
@@ -264,6 +320,7 @@ class JitterStudy:
                     for mount, part in self.budget.items()
                 },
                 "worst": worst,
+                "sweep": self.sweep(max_speed).to_dict() if np.any(self.frequency) else None,
             }
         )
 

@@ -5,6 +5,7 @@ from quietbus.plots.compare import compare_figures, envelope_comparison
 from quietbus.plots.jitter import jitter_figures
 from quietbus.plots.run import run_figures
 from quietbus.plots.style import save_figures
+from quietbus.plots.sweep import sweep_figures
 
 __all__ = [
     "analysis_figures",
@@ -13,4 +14,5 @@ __all__ = [
     "jitter_figures",
     "run_figures",
     "save_figures",
+    "sweep_figures",
 ]

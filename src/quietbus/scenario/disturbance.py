@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Discriminator, Tag, model_validator
+from pydantic import BeforeValidator, Discriminator, Tag, ValidationInfo, model_validator
 
 from quietbus.scenario.base import (
     Angle,
@@ -13,11 +14,13 @@ from quietbus.scenario.base import (
     PositiveAngularVelocity,
     PositiveNumber,
     Series,
+    Text,
     UnitCount,
     listing,
 )
-from quietbus.scenario.errors import Findings
+from quietbus.scenario.errors import Findings, ScenarioError
 from quietbus.scenario.units import Quantity, expected
+from quietbus.scenario.wheel_files import read_wheel_table
 
 COMPONENTS = ("radial_force", "axial_force", "radial_torque", "axial_torque")
 
@@ -184,10 +187,40 @@ class Broadband(Part):
 class Disturbance(Part):
     """What a rotor does to its gimbal beyond the imbalance of a rigid body."""
 
+    table: Text | None = None  # file with the orders, read when the scenario is
     orders: Annotated[tuple[Order, ...], listing(None, "orders")] | None = None
     resonances: Resonances = Resonances()
     broadband: Broadband = Broadband()
     seed: Annotated[int, BeforeValidator(_seed)] = 0  # of random phases and of the noise
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_table(cls, data: Any, info: ValidationInfo) -> Any:
+        """Put the orders and resonances of the file in the place of its name.
+
+        A relative path starts at the folder of the scenario's file.
+        """
+        if not isinstance(data, dict) or data.get("table") is None:
+            return data
+        findings = Findings()
+        name = data["table"]
+        if not isinstance(name, str) or not name:
+            raise expected("the name of a file", name)
+        if data.get("orders") is not None:
+            findings.add("table", "expected either table or orders, got both")
+        findings.raise_any()
+        folder = Path((info.context or {}).get("folder", "."))
+        try:
+            table = read_wheel_table(folder / name)
+        except ScenarioError as error:
+            for problem in error.problems:
+                findings.add("table", f"{error.source}: {problem}")
+            findings.raise_any()
+            raise
+        for lost in table.lost:
+            findings.add("table", f"{table.source}: cannot be taken over: {lost}")
+        findings.raise_any()
+        return table.to_dict() | {key: value for key, value in data.items() if key != "table"}
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -115,10 +115,13 @@ class Scenario(Part):
         return self
 
     @classmethod
-    def from_yaml(cls, text: str, source: str = "<text>") -> Self:
-        """Scenario from YAML text; ScenarioError lists all problems, with lines of ``source``."""
+    def from_yaml(cls, text: str, source: str = "<text>", folder: str = ".") -> Self:
+        """Scenario from YAML text; ScenarioError lists all problems, with lines of ``source``.
+
+        Files that it names are looked for in ``folder``.
+        """
         data, line_of = read_yaml(text, source)
-        return cls._checked(data, source, line_of)
+        return cls._checked(data, source, line_of, folder)
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], source: str = "<data>") -> Self:
@@ -127,10 +130,14 @@ class Scenario(Part):
 
     @classmethod
     def _checked(
-        cls, data: Any, source: str, line_of: Callable[[Path], int | None] | None = None
+        cls,
+        data: Any,
+        source: str,
+        line_of: Callable[[Path], int | None] | None = None,
+        folder: str = ".",
     ) -> Self:
         try:
-            return cls.model_validate(data)
+            return cls.model_validate(data, context={"folder": folder})
         except ValidationError as error:
             raise ScenarioError(source, found(error, line_of)) from None
 
