@@ -6,6 +6,7 @@ from .api import compare as compare
 from .api import jitter as jitter
 from .api import linearize as linearize
 from .api import simulate as simulate
+from .api import verify as verify
 from .jitter_study import JitterStudy as JitterStudy
 from .results import load_run as load_run
 from .results import reconstruct as reconstruct
@@ -16,5 +17,6 @@ from .scenario import Scenario as Scenario
 from .scenario import ScenarioError as ScenarioError
 from .scenario import load_scenario as load_scenario
 from .solve.harmonic import ResonanceError as ResonanceError
+from .verification import Verification as Verification
 
 __version__: str

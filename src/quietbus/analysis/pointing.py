@@ -60,7 +60,11 @@ class Statistic:
 
 
 def evaluate(
-    motion: ImageMotion, metric: Metric, stretch: tuple[float, float], wanted: Statistic
+    motion: ImageMotion,
+    metric: Metric,
+    stretch: tuple[float, float],
+    wanted: Statistic,
+    effort: float = 1.0,
 ) -> float:
     """A metric of image motion: [rad], or [-] of ``MTF_loss``.
 
@@ -68,11 +72,12 @@ def evaluate(
 
     Args:
         stretch: from, to [s]; windows lie within.
+        effort: share of the usual windows and members that are looked at.
 
     Raises:
         ValueError: a stretch outside the samples, or a window (and tau) longer than the stretch.
     """
-    judge = _Judge(motion, metric, stretch)
+    judge = _Judge(motion, metric, stretch, effort)
     if wanted.confidence is None:
         return judge.average(wanted.phases)
     alone = motion.lines is None or wanted.phases == "given"
@@ -110,12 +115,18 @@ def contributions(
 class _Judge:
     """One metric of one motion: what its windows hold, and values for members of the ensemble."""
 
-    def __init__(self, motion: ImageMotion, metric: Metric, stretch: tuple[float, float]):
-        self.motion, self.metric, self.lines = motion, metric, motion.lines
+    def __init__(
+        self,
+        motion: ImageMotion,
+        metric: Metric,
+        stretch: tuple[float, float],
+        effort: float = 1.0,
+    ):
+        self.metric, self.lines, self.effort = metric, motion.lines, effort
         signal, (start, end) = motion.signal, stretch
         check_stretch(signal, metric, stretch)
-        self.stretch, self.rng = stretch, np.random.default_rng(SEED)
-        count = signal.how_many(metric.window or 1.0 / signal.rate, WINDOWS)
+        self.rng = np.random.default_rng(SEED)
+        count = signal.how_many(metric.window or 1.0 / signal.rate, int(effort * WINDOWS))
         part = (np.arange(count) + self.rng.random(count)) / count
         low = start + 0.5 * metric.span
         self.centers = low + max(0.0, end - start - metric.span) * part
@@ -216,7 +227,7 @@ class _Judge:
         """Values of members and windows drawn together, each independent of the others."""
         values = []
         for _ in range(8):
-            n = DRAWS // 8
+            n = int(self.effort * DRAWS) // 8
             which = self.rng.integers(len(self.centers), size=n)
             values.append(self.values(self.rng.uniform(0, 2 * np.pi, (n, self.rotors)), which))
         return np.concatenate(values)
@@ -247,8 +258,8 @@ class _Judge:
 
     def ensemble(self, confidence: float) -> float:
         """Quantile over members of the largest value at any time."""
-        count = max(MEMBERS, int(np.ceil(TAIL / (1.0 - confidence))))
-        if count > MOST_MEMBERS:
+        count = int(self.effort * max(MEMBERS, np.ceil(TAIL / (1.0 - confidence))))
+        if count > self.effort * MOST_MEMBERS:
             return max(float(self.over_time(turns[None])[0]) for turns in self.aligned())
         members = self.rng.uniform(0, 2 * np.pi, (count, self.rotors))
         parts = [self.over_time(members[i : i + 500]) for i in range(0, count, 500)]

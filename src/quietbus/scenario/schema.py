@@ -14,6 +14,7 @@ from quietbus.scenario.base import Duration, Frequency, Part, PositiveNumber, Te
 from quietbus.scenario.control import Control, Initial, Load, PseudoInverse, Target
 from quietbus.scenario.errors import Findings, Path, Problem, ScenarioError, dotted, found
 from quietbus.scenario.hardware import Bus, Cluster, Isolator
+from quietbus.scenario.pointing import LinesOfSight, Requirements, unknown_lines
 from quietbus.scenario.text import read_yaml, write_yaml
 from quietbus.scenario.units import expected
 
@@ -99,7 +100,14 @@ class Scenario(Part):
     initial: Initial = Initial()
     target: Target = Target()
     loads: Annotated[tuple[Load, ...], listing(None, "loads", least=0)] = ()
+    lines_of_sight: LinesOfSight = {}
+    requirements: Requirements = ()
     simulation: Simulation = Simulation()
+
+    @model_validator(mode="after")
+    def _check_requirements(self) -> Self:
+        unknown_lines(self.requirements, self.lines_of_sight).raise_any()
+        return self
 
     @model_validator(mode="after")
     def _check_steering(self) -> Self:
