@@ -219,6 +219,26 @@ def _transmissibility(study: Study) -> Table:
     return table
 
 
+def verification_table(numbers: Mapping[str, Any]) -> Table:
+    """What ``quietbus verify`` says, from ``Verification.to_dict``."""
+    table = _titled(f"{numbers['scenario']}, {numbers['mount']}: pointing, {numbers['method']} run")
+    for column in ("metric", "line of sight", "value", "limit", "unit", "margin", "verdict"):
+        right = column in ("value", "limit", "margin")
+        table.add_column(column, justify="right" if right else "left")
+    for row in numbers["requirements"]:
+        table.add_row(
+            row["name"],
+            row["line_of_sight"],
+            f"{row['value']:.4g}",
+            f"{row['limit']:.4g}",
+            "" if row["unit"] == "1" else row["unit"],
+            f"{row['margin_percent']:.3g} %",
+            "met" if row["met"] else "NOT MET",
+        )
+        table.add_row(f"  {row['meaning']}, {row['from_s']:g} s to {row['until_s']:g} s")
+    return table
+
+
 def jitter_tables(numbers: Mapping[str, Any]) -> Iterator[Table]:
     """What ``quietbus jitter`` says, from ``JitterStudy.to_dict``."""
     angles = ", ".join(f"{angle:.4g}" for angle in numbers["gimbal_angle_deg"])
