@@ -19,10 +19,11 @@ from quietbus.dynamics.vibration import View
 from quietbus.jitter_study import JitterStudy
 from quietbus.results import aliasing, to_dataset
 from quietbus.scenario import LineOfSight, Problem, Scenario, ScenarioError, load_scenario
+from quietbus.scenario.pointing import NO_REQUIREMENTS
 from quietbus.solve.direct import Scheme, Tolerances, integrate
 from quietbus.solve.harmonic import integrate_harmonic, on_periodic_solution
 from quietbus.study import Study
-from quietbus.verification import EXAMPLE, Verification
+from quietbus.verification import Verification
 
 Mount = Literal["isolated", "rigid"]
 METHODS = ("direct", "harmonic")
@@ -207,8 +208,7 @@ def verify(
     """
     scenario = _as_run(scenario, mount, duration, None if method == "harmonic" else output_rate)
     if not scenario.requirements:
-        problem = Problem(f"expected one or more, for example:\n\n{EXAMPLE}", ("requirements",))
-        raise ScenarioError(scenario.name, [problem])
+        raise ScenarioError(scenario.name, [Problem(NO_REQUIREMENTS, ("requirements",))])
     run = simulate(scenario, method, output_rate=output_rate, progress=progress)
     if run.attrs["status"] != "complete":
         raise SimulationError(f"the run is not complete: {run.attrs['stop_reason']}", run)

@@ -439,10 +439,15 @@ def verify(
 ) -> None:
     """Judge the scenario's pointing requirements: value, margin, verdict. Status 1: one not met."""
     checked = _load(scenario, mount, duration)
+    if not checked.requirements:
+        from quietbus.scenario.pointing import NO_REQUIREMENTS
+
+        raise _BadInput(f"{scenario}: requirements: {NO_REQUIREMENTS}")
     if not as_json:
         _make_folder(output)
     _import_heavy()
     from quietbus import api
+    from quietbus.solve.harmonic import ResonanceError
 
     try:
         with _progress({method.value: checked.simulation.duration}) as tell, _notes():
@@ -451,16 +456,17 @@ def verify(
             )
     except api.SimulationError as error:
         _fail(str(error))
-    except ValueError as error:
+    except ResonanceError as error:
         raise _BadInput(f"{scenario}: {error}") from None
     numbers = verification.to_dict()
     if as_json:
         print(json.dumps(numbers, indent=2, allow_nan=False))
     else:
         from quietbus.plots import pointing_figures
-        from quietbus.tables import verification_table
+        from quietbus.tables import verification_tables
 
-        _print(verification_table(numbers))
+        for part in verification_tables(numbers):
+            print(part) if isinstance(part, str) else _print(part)
         _write_study("verification", numbers, lambda: pointing_figures(verification), output)
     missed = [f"{v.name} of {v.line_of_sight}" for v in verification.verdicts if not v.met]
     if missed:

@@ -219,24 +219,27 @@ def _transmissibility(study: Study) -> Table:
     return table
 
 
-def verification_table(numbers: Mapping[str, Any]) -> Table:
-    """What ``quietbus verify`` says, from ``Verification.to_dict``."""
+def verification_tables(numbers: Mapping[str, Any]) -> Iterator[Table | str]:
+    """What ``quietbus verify`` says, from ``Verification.to_dict``: a table, and what is meant."""
     table = _titled(f"{numbers['scenario']}, {numbers['mount']}: pointing, {numbers['method']} run")
-    for column in ("metric", "line of sight", "value", "limit", "unit", "margin", "verdict"):
+    for column in ("", "metric", "line of sight", "value", "limit", "margin", "verdict"):
         right = column in ("value", "limit", "margin")
         table.add_column(column, justify="right" if right else "left")
-    for row in numbers["requirements"]:
+    notes = []
+    for i, row in enumerate(numbers["requirements"], 1):
+        unit = "" if row["unit"] == "1" else f" {row['unit']}"
         table.add_row(
+            str(i),
             row["name"],
             row["line_of_sight"],
-            f"{row['value']:.4g}",
-            f"{row['limit']:.4g}",
-            "" if row["unit"] == "1" else row["unit"],
-            f"{row['margin_percent']:.3g} %",
+            f"{row['value']:.3g}",
+            f"{row['limit']:.3g}{unit}",
+            f"{row['margin_percent']:.1f} %",
             "met" if row["met"] else "NOT MET",
         )
-        table.add_row(f"  {row['meaning']}, {row['from_s']:g} s to {row['until_s']:g} s")
-    return table
+        notes.append(f"{i}: {row['meaning']}; {row['from_s']:g} s to {row['until_s']:g} s")
+    yield table
+    yield from notes
 
 
 def jitter_tables(numbers: Mapping[str, Any]) -> Iterator[Table]:

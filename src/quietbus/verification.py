@@ -18,10 +18,6 @@ from quietbus.scenario import Problem, Scenario, ScenarioError
 
 ARCSEC = np.rad2deg(1.0) * 3600.0
 JUDGED = 0.1  # share of a run, its last part, that is judged unless a requirement says otherwise
-EXAMPLE = """lines_of_sight:
-  camera: {direction: [0, 0, -1]}
-requirements:
-  - RPE(camera, window = 5 ms, confidence = 0.997) <= 0.1 arcsec"""
 CURVE = 25  # exposure times
 CURVE_EFFORT = 0.125
 NOTHING = 1e-9  # of all: lines that are left out of the contributions
@@ -61,9 +57,14 @@ class Verdict:
         """Of ``shown``."""
         return "1" if self.metric.name == "MTF_loss" else "arcsec"
 
+    @property
+    def scale(self) -> float:
+        """Of values in ``unit`` by those in SI."""
+        return 1.0 if self.unit == "1" else ARCSEC
+
     def shown(self, value: float) -> float:
         """A value in ``unit``."""
-        return value if self.unit == "1" else ARCSEC * value
+        return self.scale * value
 
 
 @dataclass(frozen=True)
@@ -161,7 +162,9 @@ class Verification:
         longest = end - start - (metric.span - metric.window)
         windows = np.geomspace(metric.window / 30.0, min(30.0 * metric.window, longest), CURVE)
         values = [
-            evaluate(motion, metric.with_window(T), verdict.stretch, verdict.statistic, CURVE_EFFORT)
+            evaluate(
+                motion, metric.with_window(T), verdict.stretch, verdict.statistic, CURVE_EFFORT
+            )
             for T in windows
         ]
         return windows, np.array(values)
@@ -228,7 +231,7 @@ def _name(metric: Metric) -> str:
     if metric.above:
         parts.append(f"above {metric.above:g} Hz")
     if metric.spatial_frequency:
-        parts.append(f"at {metric.spatial_frequency / ARCSEC:.4g} cycles/arcsec")
+        parts.append(f"{metric.spatial_frequency / ARCSEC:.4g}/arcsec")
     return f"{metric.name} {', '.join(parts)}".strip()
 
 

@@ -126,9 +126,7 @@ class Lines:
     @property
     def names(self) -> tuple[str, ...]:
         """Who makes each line: ``rotor 0, 1Ω``."""
-        return tuple(
-            f"rotor {j}, {h:g}Ω" for j, h in zip(self.rotor, self.order, strict=True)
-        )
+        return tuple(f"rotor {j}, {h:g}Ω" for j, h in zip(self.rotor, self.order, strict=True))
 
     @cached_property
     def groups(self) -> np.ndarray:

@@ -160,8 +160,7 @@ class _Judge:
                 return float(np.mean(np.sum(self.slow**2, axis=1)))
 
     def phasors(self, turns: np.ndarray, which: np.ndarray | slice) -> np.ndarray:
-        """Phasors (n, group, c) in windows ``which`` as members turn their rotors (n or 1, rotor).
-        """
+        """Phasors (n, group, c) in windows ``which`` for members' turns (n or 1, rotor)."""
         if self.lines is None or not self.rotors:
             return self.base[which]
         shift = np.exp(1j * self.lines.order * turns[:, self.lines.rotor])

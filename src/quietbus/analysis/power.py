@@ -68,7 +68,9 @@ Power = LinePower | Density
 def rms_above(parts: Mapping[str, Power], frequency_hz: float) -> float:
     """Root mean square of what all contributors have at or above a frequency [Hz]."""
     below = np.nextafter(frequency_hz, 0.0) if frequency_hz > 0.0 else -1.0
-    return float(np.sqrt(sum(part.total - part.below(np.array([below]))[0] for part in parts.values())))
+    return float(
+        np.sqrt(sum(part.total - part.below(np.array([below]))[0] for part in parts.values()))
+    )
 
 
 @dataclass(frozen=True)

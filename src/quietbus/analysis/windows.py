@@ -18,9 +18,11 @@ DRIFTS = ("PDE", "PRE", "stability")
 MEANS = ("MPE", "displacement")
 INSTANTS = ("APE",)
 LINEAR = (*INSTANTS, *MEANS, "smear", *DRIFTS, "RPE")  # a deviation with a direction
-SQUARED = ("rms", "jitter", "MTF_loss")  # a size of what is left
-METRICS = ("APE", "MPE", "RPE", "PDE", "PRE", "displacement", "smear", "jitter", "stability")
-METRICS = (*METRICS, "rms", "MTF_loss")
+METRICS = (
+    *("APE", "MPE", "RPE", "PDE", "PRE"),
+    *("displacement", "smear", "jitter", "stability"),
+    *("rms", "MTF_loss"),
+)
 
 
 @dataclass(frozen=True)
@@ -161,9 +163,7 @@ def mean_square_of_density(
     return np.tensordot(share, value, axes=1)
 
 
-def checked_density(
-    frequency_hz: np.ndarray, density: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def checked_density(frequency_hz: np.ndarray, density: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A table of a one-sided power spectral density as arrays, if it is one."""
     f, S = np.asarray(frequency_hz, float), np.asarray(density, float)
     if f.ndim != 1 or len(f) < 2 or len(S) != len(f):

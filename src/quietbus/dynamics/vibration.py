@@ -321,7 +321,7 @@ class View(eqx.Module):
     line_of_sight: Float[Array, "line 3 12"]
 
 
-NOTHING_SEEN = View(np.zeros((0, 3)), np.zeros((0, 3, 12)))
+NOTHING_SEEN = View(np.zeros((0, 3)), np.zeros((0, 3, 12)))  # type: ignore[arg-type]
 
 
 def linear_outputs(

@@ -9,7 +9,8 @@ import numpy as np
 
 from quietbus.analysis.power import Density, LinePower, cumulative
 from quietbus.analysis.spectrum import detrended
-from quietbus.plots.style import COLOURS, DASHES, explain, new_figure, style
+from quietbus.plots.jitter import log_scale
+from quietbus.plots.style import COLOURS, DASHES, explain, new_figure, share_legend, style
 from quietbus.verification import ARCSEC
 
 if TYPE_CHECKING:
@@ -138,27 +139,30 @@ def exposure(verification: Verification) -> Figure:
         _exposure(axes, verdict, *curve)
     for axes in panels[len(found) :]:
         axes.set_visible(False)
+    share_legend(figure, panels[0])
     return figure
 
 
 def _exposure(axes: Axes, verdict: Verdict, windows: np.ndarray, values: np.ndarray) -> None:
     """One metric: the curve, the limit at the required window, and where that window lies."""
     metric, scale = verdict.metric, 1e3
-    axes.plot(scale * windows, verdict.shown(values), color=COLOURS[0], label=metric.name)
+    axes.plot(scale * windows, verdict.scale * values, color=COLOURS[0], label="metric")
     axes.axhline(verdict.shown(verdict.limit), color=COLOURS[1], linestyle=DASHES[1], label="limit")
     axes.axvline(scale * metric.window, color="0.6", linewidth=0.8, linestyle=DASHES[3])
     value = verdict.shown(verdict.value)
-    word = "met" if verdict.met else "NOT MET"
     axes.plot(
         scale * metric.window,
         value,
         "o" if verdict.met else "X",
         color="k",
         markersize=6,
-        label=f"{value:.3g}: {word}, margin {verdict.margin_percent:.3g} %",
+        label="at the required exposure: value, met (dot) or not met (cross)",
     )
-    axes.set(xscale="log", yscale="log", xlabel="exposure [ms]")
+    every = np.array([*(verdict.scale * values), value, verdict.shown(verdict.limit)])
+    log_scale(axes, 0.5 * float(np.min(every[every > 0.0])), 2.0 * float(np.max(every)))
+    axes.set(xscale="log", xlabel="exposure [ms]")
     unit = "" if verdict.unit == "1" else f" [{verdict.unit}]"
     axes.set_ylabel(f"{metric.name}{unit or ' [-]'}")
-    axes.set_title(textwrap.fill(f"{verdict.line_of_sight}: {verdict.meaning}", 46), fontsize=8.5)
-    axes.legend(fontsize=8)
+    word = "met" if verdict.met else "NOT MET"
+    said = f"{verdict.line_of_sight}: {value:.3g}, {word}, margin {verdict.margin_percent:.3g} %"
+    axes.set_title(textwrap.fill(f"{said}; {verdict.meaning}", 52), fontsize=8.5)

@@ -66,7 +66,7 @@ class LineOfSight(Part):
         return 2 if self.sensitivity is None else len(self.sensitivity)
 
     def matrix(self) -> np.ndarray:
-        """(3, 12) what the motions above do: theta x direction, or the rows filled up with zeros."""
+        """(3, 12) what those motions do: theta x direction, or the rows filled up with zeros."""
         if self.direction is not None:
             by_turn = np.cross(np.eye(3), self.direction).T
             return np.hstack([by_turn, np.zeros((3, 9))])
@@ -181,6 +181,12 @@ _FORMS: dict[str, type[_Requirement]] = {
     for name in form.model_fields["metric"].annotation.__args__  # type: ignore[union-attr]
 }
 EXAMPLE = "RPE(camera, window = 5 ms, confidence = 0.997) <= 0.1 arcsec"
+NO_REQUIREMENTS = f"""expected one or more, for example:
+
+lines_of_sight:
+  camera: {{direction: [0, 0, -1]}}
+requirements:
+  - {EXAMPLE}"""
 _SHORT = re.compile(r"\s*(\w+)\s*\(\s*([^=,()]+?)\s*((?:,[^,=]+=[^,=]+)*)\)\s*(?:<=|≤)\s*(.+?)\s*")
 
 

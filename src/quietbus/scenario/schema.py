@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Self
 
-from pydantic import BeforeValidator, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from quietbus.scenario.base import Duration, Frequency, Part, PositiveNumber, Text, listing
 from quietbus.scenario.control import Control, Initial, Load, PseudoInverse, Target
@@ -100,7 +100,7 @@ class Scenario(Part):
     initial: Initial = Initial()
     target: Target = Target()
     loads: Annotated[tuple[Load, ...], listing(None, "loads", least=0)] = ()
-    lines_of_sight: LinesOfSight = {}
+    lines_of_sight: LinesOfSight = Field(default={})
     requirements: Requirements = ()
     simulation: Simulation = Simulation()
 
