@@ -304,6 +304,24 @@ def test_the_worst_member_has_all_rotors_in_phase():
     assert rare == pytest.approx(np.sum(sizes), rel=1e-3)
 
 
+@pytest.mark.parametrize("name", ["APE", "smear", "jitter", "rms"])
+def test_no_members_tried_at_random_are_worse_than_the_worst(name):
+    """Four rotors with two orders each, none of which can be neglected."""
+    rng = np.random.default_rng(0)
+    amplitude = rng.normal(size=(8, 2)) + 1j * rng.normal(size=(8, 2))
+    order, rotor = np.tile([1, 2], 4), np.repeat(range(4), 2)
+    which = Metric(name, 0.005, 0.0, 10.0)
+    motion = with_lines(amplitude, 200 * np.pi * order, rotor, order)
+    found = evaluate(motion, which, (1.0, 9.0), Statistic(0.95))
+    tried = []
+    for turns in rng.uniform(0, 2 * np.pi, (300, 4)):
+        member = with_lines(amplitude, 200 * np.pi * order, rotor, order, order * turns[rotor])
+        wanted = Statistic(0.95, "temporal", "given")
+        tried.append(evaluate(member, which, (1.0, 9.0), wanted, 0.05))
+    assert found > 0.995 * max(tried)
+    assert found < 1.6 * max(tried)
+
+
 @pytest.mark.parametrize("name", LINEAR)
 def test_interpretations_are_ordered(name):
     """Always for a share of members is more than a share of all; so is the worst member's."""
