@@ -18,7 +18,7 @@ from quietbus.scenario import Problem, Scenario, ScenarioError
 
 ARCSEC = np.rad2deg(1.0) * 3600.0
 JUDGED = 0.1  # share of a run, its last part, that is judged unless a requirement says otherwise
-CURVE = 25  # exposure times
+CURVE = 17  # exposure times
 CURVE_EFFORT = 0.1
 NOTHING = 1e-9  # of all: lines that are left out of the contributions
 

@@ -32,7 +32,7 @@ MEMBERS = 2000  # at least (ensemble)
 MOST_MEMBERS = 20_000  # (ensemble); rarer ones are bounded by the worst member
 TAIL = 20  # members or more beyond the level (ensemble)
 TRIED = 2048  # windows in which the worst member is sought (temporal)
-STARTS, SWEEPS = 4, 4  # of that search
+STARTS, SWEEPS = 3, 4  # of that search
 TURN = 2.0 * np.pi
 DIRECTIONS = 120  # around the circle
 LOOKS = 16  # windows over which lines' amplitudes change (ensemble)
@@ -249,7 +249,7 @@ class _Judge:
             lambda turns: -quantile(turns, some) / (np.max(first) or 1.0),
             best[0],
             method="Nelder-Mead",
-            options={"maxfev": 60 * self.rotors, "xatol": 1e-2, "fatol": 1e-4},
+            options={"maxfev": 25 * self.rotors, "xatol": 1e-2, "fatol": 1e-4},
         )
         return max(quantile(turns, slice(None)) for turns in (*best, improved.x))
 
@@ -266,7 +266,7 @@ class _Judge:
         folded = np.where(backwards[:, None], middle.conj(), middle)
         order = np.where(backwards, -1.0, 1.0) * self.lines.order
         share = np.sqrt(np.maximum(weight(self.metric, np.abs(self.lines.frequency) / TURN), 0.0))
-        along = np.repeat(share * (half_circle(middle.shape[1])[::3] @ folded.T), STARTS, axis=0)
+        along = np.repeat(share * (half_circle(middle.shape[1])[::6] @ folded.T), STARTS, axis=0)
         turns = self.rng.uniform(0.0, TURN, (len(along), self.rotors))
         member = (self.lines.groups[:, None] == np.arange(self.lines.count)).astype(float)
         steps = TURN * np.arange(96) / 96

@@ -104,6 +104,9 @@ class Scenario(Part):
     requirements: Requirements = ()
     simulation: Simulation = Simulation()
 
+    def __hash__(self) -> int:
+        return hash(json.dumps(self.to_dict(), sort_keys=True))
+
     @model_validator(mode="after")
     def _check_requirements(self) -> Self:
         unknown_lines(self.requirements, self.lines_of_sight).raise_any()

@@ -193,7 +193,7 @@ class Quantity:
         angular = "[angle]" in expected and set(expected) <= {"[angle]", "[time]"}
         if powers == expected:
             return number * factor
-        if not (angular or self.unit == "Hz") and _without_angle(powers) == _without_angle(
+        if not (angular or self.unit in ("", "Hz")) and _without_angle(powers) == _without_angle(
             expected
         ):
             return number * factor
