@@ -23,7 +23,7 @@ from quietbus.scenario.pointing import NO_REQUIREMENTS
 from quietbus.solve.direct import Scheme, Tolerances, integrate
 from quietbus.solve.harmonic import integrate_harmonic, on_periodic_solution
 from quietbus.study import Study
-from quietbus.verification import Verification
+from quietbus.verification import Verification, check_requirements
 
 Mount = Literal["isolated", "rigid"]
 METHODS = ("direct", "harmonic")
@@ -209,6 +209,7 @@ def verify(
     scenario = _as_run(scenario, mount, duration, None if method == "harmonic" else output_rate)
     if not scenario.requirements:
         raise ScenarioError(scenario.name, [Problem(NO_REQUIREMENTS, ("requirements",))])
+    check_requirements(scenario, method, scenario.simulation.duration)
     run = simulate(scenario, method, output_rate=output_rate, progress=progress)
     if run.attrs["status"] != "complete":
         raise SimulationError(f"the run is not complete: {run.attrs['stop_reason']}", run)

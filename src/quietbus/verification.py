@@ -75,23 +75,14 @@ class Verification:
     requirement does not say otherwise. A direct run is the only member of its ensemble.
 
     Raises:
-        ScenarioError: windows longer than the stretch that is judged, or a stretch outside the run.
-        ValueError: a direct run whose samples cannot show the rotors' lines.
+        ScenarioError: requirements that the run cannot judge (``check_requirements``).
     """
 
     run: xr.Dataset
 
     def __post_init__(self) -> None:
-        problems = []
-        for i, requirement in enumerate(self.scenario.requirements):
-            signal = self.motion(requirement.line_of_sight).signal
-            try:
-                check_stretch(signal, _metric(requirement), self._stretch(requirement))
-                _check_rate(self.run, _metric(requirement), signal)
-            except ValueError as error:
-                problems.append(Problem(str(error), ("requirements", i)))
-        if problems:
-            raise ScenarioError(self.scenario.name, problems)
+        time = self.run["time"].to_numpy()
+        check_requirements(self.scenario, self.run.attrs["method"], float(time[-1]))
 
     @cached_property
     def scenario(self) -> Scenario:
@@ -106,21 +97,14 @@ class Verification:
         """Image motion of a line of sight [rad]."""
         return self._motions[line_of_sight]
 
-    def _stretch(self, requirement: Any) -> tuple[float, float]:
-        time = self.run["time"].to_numpy()
-        end = float(time[-1]) if requirement.end is None else requirement.end
-        start = requirement.start
-        if start is None:
-            start = max(float(time[0]), end - JUDGED * float(time[-1] - time[0]))
-        return start, end
-
     @cached_property
     def verdicts(self) -> tuple[Verdict, ...]:
         """In the order of the scenario."""
         return tuple(self._verdict(requirement) for requirement in self.scenario.requirements)
 
     def _verdict(self, requirement: Any) -> Verdict:
-        metric, stretch = _metric(requirement), self._stretch(requirement)
+        last = float(self.run["time"][-1])
+        metric, stretch = _metric(requirement), _stretch(requirement, last)
         motion = self._judged(requirement)
         statistic = Statistic(
             requirement.confidence, requirement.interpretation, requirement.rotor_phases
@@ -207,18 +191,39 @@ def _metric(requirement: Any) -> Metric:
     return Metric(requirement.metric, *(getattr(requirement, name, 0.0) for name in fields))
 
 
-def _check_rate(run: xr.Dataset, metric: Metric, signal: SampledSignal) -> None:
-    """Refuse what the samples of a direct run cannot show."""
-    if run.attrs["method"] == "harmonic":
-        return
-    reason = aliasing(scenario_of(run))
-    if reason:
-        raise ValueError(f"{reason}. Use method 'harmonic', or raise simulation.output_rate")
-    if metric.above >= 0.5 * signal.rate:
-        raise ValueError(
-            f"above: expected less than {0.5 * signal.rate:g} Hz, half the output rate; got "
-            f"{metric.above:g} Hz"
-        )
+def _stretch(requirement: Any, last: float) -> tuple[float, float]:
+    """What is judged of a run from 0 to ``last`` [s]."""
+    end = last if requirement.end is None else requirement.end
+    start = requirement.start
+    return (max(0.0, end - JUDGED * last) if start is None else start), end
+
+
+def check_requirements(scenario: Scenario, method: str, last: float) -> None:
+    """Refuse requirements that a run from 0 to ``last`` [s] cannot judge, before it is made.
+
+    Raises:
+        ScenarioError: windows longer than the stretch that is judged, a stretch outside the run, or
+            an output rate of a direct run that shows too little.
+    """
+    problems = []
+    nyquist = 0.5 * scenario.simulation.output_rate
+    too_coarse = "" if method == "harmonic" else aliasing(scenario)
+    if too_coarse:
+        text = f"{too_coarse}. Use method 'harmonic', or raise simulation.output_rate"
+        problems.append(Problem(text, ("requirements",)))
+    for i, requirement in enumerate(scenario.requirements):
+        metric = _metric(requirement)
+        try:
+            check_stretch(0.0, last, metric, _stretch(requirement, last))
+        except ValueError as error:
+            problems.append(Problem(str(error), ("requirements", i)))
+        if method != "harmonic" and metric.above >= nyquist:
+            text = (
+                f"expected less than {nyquist:g} Hz, half the output rate; got {metric.above:g} Hz"
+            )
+            problems.append(Problem(text, ("requirements", i, "above")))
+    if problems:
+        raise ScenarioError(scenario.name, problems)
 
 
 def _name(metric: Metric) -> str:

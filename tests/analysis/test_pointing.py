@@ -252,14 +252,20 @@ def test_slow_motion_and_lines_add_squares():
     slow = sampled(lambda t: 0.5 * t, rate=10.0)
     both = ImageMotion(slow, SINE_LINE.lines)
     for name in ("RPE", "smear", "jitter", "PDE"):
-        parts = [evaluate(each, metric(name), (1.0, 9.0), RMS) for each in (ImageMotion(slow), SINE_LINE)]
-        assert evaluate(both, metric(name), (1.0, 9.0), RMS) == pytest.approx(np.hypot(*parts), rel=3e-3)
+        parts = [
+            evaluate(each, metric(name), (1.0, 9.0), RMS) for each in (ImageMotion(slow), SINE_LINE)
+        ]
+        assert evaluate(both, metric(name), (1.0, 9.0), RMS) == pytest.approx(
+            np.hypot(*parts), rel=3e-3
+        )
     whole = ImageMotion(sampled(lambda t: 0.5 * t + A * np.cos(2 * np.pi * F * t + 0.4), rate=2000))
     for confidence in (None, 0.9):
         wanted = Statistic(confidence, "temporal", "given")
         for name in ("RPE", "smear", "PDE", "APE"):
             in_time = evaluate(whole, metric(name), (1.0, 9.0), wanted)
-            assert evaluate(both, metric(name), (1.0, 9.0), wanted) == pytest.approx(in_time, rel=1e-2)
+            assert evaluate(both, metric(name), (1.0, 9.0), wanted) == pytest.approx(
+                in_time, rel=1e-2
+            )
 
 
 # ---- the ensemble: rotor phases
@@ -326,14 +332,14 @@ def test_no_members_tried_at_random_are_worse_than_the_worst(name):
 def test_interpretations_are_ordered(name):
     """Always for a share of members is more than a share of all; so is the worst member's."""
     ensemble, temporal, mixed = (
-        evaluate(SEVERAL, metric(name), (1.0, 9.0), Statistic(0.95, way))
-        for way in INTERPRETATIONS
+        evaluate(SEVERAL, metric(name), (1.0, 9.0), Statistic(0.95, way)) for way in INTERPRETATIONS
     )
     assert mixed < temporal
     assert mixed < ensemble
 
 
 # ---- images
+
 
 def test_mtf_of_motion_has_the_closed_forms():
     x = (np.arange(200_000) + 0.5) / 200_000
@@ -354,6 +360,7 @@ def test_mtf_loss_of_a_fast_sine_is_the_true_one_while_it_is_small():
 
 
 # ---- bad input
+
 
 @pytest.mark.parametrize(
     ("which", "stretch", "said"),
@@ -386,4 +393,6 @@ def test_unknown_words_and_bad_signals_are_refused():
     with pytest.raises(ValueError, match="all finite"):
         SampledSignal(np.arange(3.0), np.full((3, 1), np.nan))
     with pytest.raises(ValueError, match="one or two components, got 3"):
-        evaluate(with_lines([[1, 1, 1]], 9.0), Metric("APE"), (1.0, 9.0), Statistic(0.9, "ensemble"))
+        evaluate(
+            with_lines([[1, 1, 1]], 9.0), Metric("APE"), (1.0, 9.0), Statistic(0.9, "ensemble")
+        )

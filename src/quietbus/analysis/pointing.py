@@ -125,7 +125,7 @@ class _Judge:
     ):
         self.metric, self.lines, self.effort = metric, motion.lines, effort
         signal, (start, end) = motion.signal, stretch
-        check_stretch(signal, metric, stretch)
+        check_stretch(float(signal.time[0]), float(signal.time[-1]), metric, stretch)
         self.rng = np.random.default_rng(SEED)
         count = signal.how_many(metric.window or 1.0 / signal.rate, int(effort * WINDOWS))
         part = (np.arange(count) + self.rng.random(count)) / count
@@ -318,10 +318,13 @@ class _Judge:
         return largest / (np.cos(np.pi / DIRECTIONS) if len(around) > 2 else 1.0)
 
 
-def check_stretch(signal: SampledSignal, metric: Metric, stretch: tuple[float, float]) -> None:
-    """Refuse a stretch outside the samples and a window longer than the stretch."""
+def check_stretch(first: float, last: float, metric: Metric, stretch: tuple[float, float]) -> None:
+    """Refuse a stretch outside a run from first to last [s], and a window longer than the stretch.
+
+    Raises:
+        ValueError: says which.
+    """
     start, end = stretch
-    first, last = float(signal.time[0]), float(signal.time[-1])
     slack = 1e-9 * max(1.0, last)
     if not (first - slack <= start < end <= last + slack):
         raise ValueError(

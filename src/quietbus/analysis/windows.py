@@ -151,7 +151,9 @@ def mean_square_of_density(
         raise ValueError(
             f"a window of {metric.span:g} s has too many periods of {f[-1]:g} Hz to integrate over"
         )
-    edges = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(f[:-1], f[1:], pieces, strict=True)]
+    edges = [
+        np.linspace(a, b, n, endpoint=False) for a, b, n in zip(f[:-1], f[1:], pieces, strict=True)
+    ]
     if metric.name == "rms" and f[0] < metric.above < f[-1]:
         edges.append(np.array([metric.above]))
     x = np.unique(np.concatenate([*edges, f[-1:]]))
