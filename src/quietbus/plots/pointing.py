@@ -165,4 +165,4 @@ def _exposure(axes: Axes, verdict: Verdict, windows: np.ndarray, values: np.ndar
     axes.set_ylabel(f"{metric.name}{unit or ' [-]'}")
     word = "met" if verdict.met else "NOT MET"
     said = f"{verdict.line_of_sight}: {value:.3g}, {word}, margin {verdict.margin_percent:.3g} %"
-    axes.set_title(textwrap.fill(f"{said}; {verdict.meaning}", 52), fontsize=8.5)
+    axes.set_title(textwrap.fill(f"{said}; {verdict.meaning}", 46), fontsize=8.5)
