@@ -204,7 +204,8 @@ def _contents(annotation):
         origin, arguments = typing.get_origin(item), typing.get_args(item)
         if origin is tuple and arguments[-1] is Ellipsis:
             # one part for all legs or a list of them is written once, as one part
-            listed = listed or (_is_part(arguments[0]) and arguments[0] not in parts)
+            inside = _contents(arguments[0])[0]
+            listed = listed or (bool(inside) and not set(inside) & set(parts))
             left.insert(0, arguments[0])
         elif _is_part(item):
             parts += [item] if item not in parts else []
