@@ -20,11 +20,13 @@ from quietbus.jitter_study import JitterStudy
 from quietbus.platform_study import PlatformStudy
 from quietbus.resolution import refuse_coarse_output, refuse_coarse_tolerance, ripple_unseen
 from quietbus.results import aliasing, to_dataset
-from quietbus.scenario import Scenario, load_scenario
+from quietbus.scenario import LineOfSight, Problem, Scenario, ScenarioError, load_scenario
+from quietbus.scenario.pointing import NO_REQUIREMENTS
 from quietbus.solve.direct import Scheme, Tolerances, integrate
 from quietbus.solve.harmonic import integrate_harmonic, on_periodic_solution
 from quietbus.solve.noise import with_noise
 from quietbus.study import Study
+from quietbus.verification import Verification, check_requirements
 
 Mount = Literal["isolated", "rigid"]
 METHODS = ("direct", "harmonic")
@@ -67,8 +69,8 @@ def simulate(
         joint_forces: also give the constraint forces in the legs' joints (direct, isolated mount).
         points: (3,) points of the bus [m], bus frame, by name, where the jitter of the
             acceleration is wanted (harmonic).
-        lines_of_sight: (3,) directions, bus frame, by name, of which the jitter is wanted
-            (harmonic).
+        lines_of_sight: what the jitter is wanted of, beside the scenario's own: by name a (3,)
+            direction, bus frame, or a (1 to 3, 12) sensitivity as in docs/scenario.md (harmonic).
         progress: called with the simulated time reached [s].
 
     Returns:
@@ -226,6 +228,42 @@ def platforms(
     return PlatformStudy(loaded, tuple(angles))
 
 
+def verify(
+    scenario: Scenario | str,
+    method: str = "harmonic",
+    mount: Mount | None = None,
+    *,
+    duration: float | None = None,
+    output_rate: float | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Verification:
+    """The scenario's pointing requirements, each with value, margin and verdict.
+
+    Args:
+        scenario: a scenario, the path of a scenario file, or a built-in's name.
+        method: "harmonic": slow motion and lines, over all rotor phases. "direct": one run with
+            every rotor turn resolved, the only member of its ensemble.
+        mount, duration, output_rate, progress: as of ``simulate``.
+
+    Returns:
+        The verdicts; ``to_dict()`` gives them all (docs/pointing.md).
+
+    Raises:
+        ScenarioError: the scenario is not valid, has no requirements, or one with windows longer
+            than the stretch that is judged.
+        SimulationError: the run is not complete.
+        ValueError, ResonanceError: as of ``simulate``.
+    """
+    scenario = _as_run(scenario, mount, duration, None if method == "harmonic" else output_rate)
+    if not scenario.requirements:
+        raise ScenarioError(scenario.name, [Problem(NO_REQUIREMENTS, ("requirements",))])
+    check_requirements(scenario, method, scenario.simulation.duration)
+    run = simulate(scenario, method, output_rate=output_rate, progress=progress)
+    if run.attrs["status"] != "complete":
+        raise SimulationError(f"the run is not complete: {run.attrs['stop_reason']}", run)
+    return Verification(run)
+
+
 def linearize(
     scenario: Scenario | str,
     rate: ArrayLike | None = None,
@@ -276,6 +314,21 @@ def _vector(name: str, value: ArrayLike, size: int) -> np.ndarray:
     if vector.shape != (size,) or not np.all(np.isfinite(vector)):
         raise ValueError(f"{name}: expected {size} finite numbers, got {value!r}")
     return vector
+
+
+def _sensitivity(name: str, given: ArrayLike) -> np.ndarray:
+    """(3, 12) of a direction, or of a matrix with zero rows for what it does not have."""
+    values = np.asarray(given, dtype=float)
+    if values.ndim < 2:
+        direction = _vector(name, given, 3)
+        if not np.any(direction):
+            raise ValueError(f"{name}: expected a direction, got zero")
+        return LineOfSight(direction=tuple(direction / np.linalg.norm(direction))).matrix()
+    if values.ndim != 2 or not 1 <= len(values) <= 3 or values.shape[1] != 12:
+        raise ValueError(f"{name}: expected one to three rows of 12 numbers, got {values.shape}")
+    if not np.all(np.isfinite(values)):
+        raise ValueError(f"{name}: expected finite numbers, got {given!r}")
+    return np.pad(values, ((0, 3 - len(values)), (0, 0)))
 
 
 def _as_run(
@@ -332,13 +385,11 @@ def _harmonic(
 ) -> tuple[xr.Dataset, tuple[str, ...]]:
     """The run, and what the user should know of it."""
     at = [_vector(f"points[{name!r}]", p, 3) for name, p in points.items()]
-    along = [_vector(f"lines_of_sight[{name!r}]", d, 3) for name, d in lines_of_sight.items()]
-    for name, direction in zip(lines_of_sight, along, strict=True):
-        if not np.any(direction):
-            raise ValueError(f"lines_of_sight[{name!r}]: expected a direction, got zero")
+    own = {name: line.matrix() for name, line in scenario.lines_of_sight.items()}
+    lines_of_sight = own | dict(lines_of_sight)
+    along = [_sensitivity(f"lines_of_sight[{n!r}]", given) for n, given in lines_of_sight.items()]
     view = View(
-        jnp.asarray(np.array(at).reshape(-1, 3)),
-        jnp.asarray(np.array([d / np.linalg.norm(d) for d in along]).reshape(-1, 3)),
+        jnp.asarray(np.array(at).reshape(-1, 3)), jnp.asarray(np.array(along).reshape(-1, 3, 12))
     )
     started = time.perf_counter()
     satellite = build_satellite(scenario)

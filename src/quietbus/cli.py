@@ -524,6 +524,56 @@ def fit(
 
 
 @app.command()
+def verify(
+    scenario: ScenarioArgument,
+    output: FolderOption = Path("out"),
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON object and nothing else; no pictures.")
+    ] = False,
+    method: Annotated[
+        Method,
+        typer.Option(help="harmonic: over all rotor phases; direct: one run, every rotor turn."),
+    ] = Method.harmonic,
+    mount: Annotated[Mount | None, typer.Option(help="Instead of the scenario's mount.")] = None,
+    duration: DurationOption = None,
+) -> None:
+    """Judge the scenario's pointing requirements: value, margin, verdict. Status 1: one not met."""
+    checked = _load(scenario, mount, duration)
+    if not checked.requirements:
+        from quietbus.scenario.pointing import NO_REQUIREMENTS
+
+        raise _BadInput(f"{scenario}: requirements: {NO_REQUIREMENTS}")
+    if not as_json:
+        _make_folder(output)
+    _import_heavy()
+    from quietbus import api
+    from quietbus.solve.harmonic import ResonanceError
+
+    try:
+        with _progress({method.value: checked.simulation.duration}) as tell, _notes():
+            verification = api.verify(
+                checked, method.value, progress=lambda t: tell(method.value, t)
+            )
+    except api.SimulationError as error:
+        _fail(str(error))
+    except ResonanceError as error:
+        raise _BadInput(f"{scenario}: {error}") from None
+    numbers = verification.to_dict()
+    if as_json:
+        print(json.dumps(numbers, indent=2, allow_nan=False))
+    else:
+        from quietbus.plots import pointing_figures
+        from quietbus.tables import verification_tables
+
+        for part in verification_tables(numbers):
+            print(part) if isinstance(part, str) else _print(part)
+        _write_study("verification", numbers, lambda: pointing_figures(verification), output)
+    missed = [f"{v.name} of {v.line_of_sight}" for v in verification.verdicts if not v.met]
+    if missed:
+        _fail(f"{len(missed)} of {len(verification.verdicts)} not met: {'; '.join(missed)}")
+
+
+@app.command()
 def reproduce(
     paper: Annotated[str, typer.Argument(metavar="PAPER", help="Name of a paper: zhang2012.")],
     output: FolderOption = Path("reproduction"),

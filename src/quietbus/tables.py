@@ -220,6 +220,29 @@ def _transmissibility(study: Study) -> Table:
     return table
 
 
+def verification_tables(numbers: Mapping[str, Any]) -> Iterator[Table | str]:
+    """What ``quietbus verify`` says, from ``Verification.to_dict``: a table, and what is meant."""
+    table = _titled(f"{numbers['scenario']}, {numbers['mount']}: pointing, {numbers['method']} run")
+    for column in ("", "metric", "line of sight", "value", "limit", "margin", "verdict"):
+        right = column in ("value", "limit", "margin")
+        table.add_column(column, justify="right" if right else "left")
+    notes = []
+    for i, row in enumerate(numbers["requirements"], 1):
+        unit = "" if row["unit"] == "1" else f" {row['unit']}"
+        table.add_row(
+            str(i),
+            row["name"],
+            row["line_of_sight"],
+            f"{row['value']:.3g}",
+            f"{row['limit']:.3g}{unit}",
+            f"{row['margin_percent']:.1f} %",
+            "met" if row["met"] else "NOT MET",
+        )
+        notes.append(f"{i}: {row['meaning']}; {row['from_s']:g} s to {row['until_s']:g} s")
+    yield table
+    yield from notes
+
+
 def jitter_tables(numbers: Mapping[str, Any]) -> Iterator[Table]:
     """What ``quietbus jitter`` says, from ``JitterStudy.to_dict``."""
     angles = ", ".join(f"{angle:.4g}" for angle in numbers["gimbal_angle_deg"])

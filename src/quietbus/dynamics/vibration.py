@@ -344,10 +344,12 @@ class View(eqx.Module):
     """What of the bus is looked at, beyond the usual outputs."""
 
     point_B: Float[Array, "point 3"]  # [m] where accelerations are wanted
-    line_of_sight_B: Float[Array, "line 3"]  # [-] unit vectors
+    # [rad per rad, m] image motion by turn and displacement of the bus, and by those of the plate
+    # from its place in the bus
+    line_of_sight: Float[Array, "line 3 12"]
 
 
-NOTHING_SEEN = View(*np.zeros((2, 0, 3)))
+NOTHING_SEEN = View(np.zeros((0, 3)), np.zeros((0, 3, 12)))  # type: ignore[arg-type]
 
 
 def linear_outputs(
@@ -368,6 +370,8 @@ def linear_outputs(
     _, damper = jax.jvp(legs.strut_force, at, (0.0 * one, one))
     turning = s * jnp.eye(3) + small.turning
     point = r_B + cross(theta_B, view.point_B)
+    r_BP = r_P - r_B - cross(theta_B, plates.p_BP)
+    moves_image = jnp.concatenate([theta_B, r_B, theta_P - theta_B, r_BP])
     return {
         "bus_rate": turning @ theta_B,
         "bus_attitude": theta_B,
@@ -375,5 +379,5 @@ def linear_outputs(
         "leg_stroke": stroke,
         "leg_force": (spring + s * damper) * stroke,
         "point_acceleration": rotate(turning @ turning, point),
-        "line_of_sight": cross(theta_B, view.line_of_sight_B),
+        "line_of_sight": view.line_of_sight @ moves_image,
     }

@@ -8,12 +8,13 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Self
 
-from pydantic import BeforeValidator, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from quietbus.scenario.base import Duration, Frequency, Part, PositiveNumber, Text, listing
 from quietbus.scenario.control import Control, Initial, Load, PseudoInverse, Target
 from quietbus.scenario.errors import Findings, Path, Problem, ScenarioError, dotted, found
 from quietbus.scenario.hardware import Bus, Cluster, Isolator
+from quietbus.scenario.pointing import LinesOfSight, Requirements, unknown_lines
 from quietbus.scenario.text import read_yaml, write_yaml
 from quietbus.scenario.units import expected
 
@@ -99,7 +100,17 @@ class Scenario(Part):
     initial: Initial = Initial()
     target: Target = Target()
     loads: Annotated[tuple[Load, ...], listing(None, "loads", least=0)] = ()
+    lines_of_sight: LinesOfSight = Field(default={})
+    requirements: Requirements = ()
     simulation: Simulation = Simulation()
+
+    def __hash__(self) -> int:
+        return hash(json.dumps(self.to_dict(), sort_keys=True))
+
+    @model_validator(mode="after")
+    def _check_requirements(self) -> Self:
+        unknown_lines(self.requirements, self.lines_of_sight).raise_any()
+        return self
 
     @model_validator(mode="after")
     def _check_steering(self) -> Self:

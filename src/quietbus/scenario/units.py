@@ -195,7 +195,7 @@ class Quantity:
         angular = "[angle]" in expected and set(expected) <= {"[angle]", "[time]"}
         if powers == expected:
             return number * factor
-        strict = angular or self.exact or self.unit == "Hz"
+        strict = angular or self.exact or self.unit in ("", "Hz")
         if not strict and _without_angle(powers) == _without_angle(expected):
             return number * factor
         raise self._error(text, self._guess(expected, powers))
