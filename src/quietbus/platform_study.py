@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike
 from quietbus.analysis.coupled import CoupledAnalysis, analyze_coupled
 from quietbus.analysis.jitter import AT_REST, Combined, combine
 from quietbus.analysis.loop import PID
-from quietbus.analysis.platforms import Platforms, as_one_cluster
+from quietbus.analysis.platforms import Platforms
 from quietbus.build import build_satellite
 from quietbus.scenario import Problem, Scenario, ScenarioError
+from quietbus.scenario.checks import listed
 from quietbus.solve.harmonic import refuse_resonance
 
 SHARED = ("bus", "control")  # what is the satellite's and not a platform's
@@ -44,10 +45,10 @@ class PlatformStudy:
                 f"platform accelerates by {error:.3g} (SI). Take the struts' preload away "
                 "(isolator.legs.free_length)"
             )
-        whole = as_one_cluster(self.platforms.satellites)
         for mount, small in (("isolated", self.platforms.small), ("rigid", self.platforms.bolted)):
             modes = np.linalg.eigvals(small.state_matrix())
-            refuse_resonance(whole, f"with mount {mount}", modes)
+            for i, satellite in enumerate(self.platforms.satellites):
+                refuse_resonance(satellite, f"with mount {mount} of platform {i}", modes)
 
     @cached_property
     def platforms(self) -> Platforms:
@@ -74,8 +75,7 @@ class PlatformStudy:
     def combined(self, mount: str) -> Combined:
         """Bus rate of all rotors and orders together [rad/s]."""
         phases = [s.cluster.rotor_phase for s in self.platforms.satellites]
-        orders = np.arange(1, 1 + self.platforms.frequency.shape[1])
-        angles = np.outer(np.concatenate(phases), orders)
+        angles = np.outer(np.concatenate(phases), self.platforms.orders)
         return combine(self.bus_rate(mount), self.platforms.frequency, angles)
 
     def static_stroke(self, torque: ArrayLike) -> tuple[np.ndarray, ...]:
@@ -112,5 +112,13 @@ def _check_shared(scenarios: Sequence[Scenario]) -> None:
             for key in SHARED
             if getattr(other, key) != getattr(first, key)
         ]
+        if other.cluster.orders != first.cluster.orders:
+            problems.append(
+                Problem(
+                    f"expected the orders of '{first.name}', {listed(first.cluster.orders)}, for "
+                    f"the rotors of every platform, got {listed(other.cluster.orders)}",
+                    ("cluster", "rotor", "disturbance", "orders"),
+                )
+            )
         if problems:
             raise ScenarioError(other.name, problems)

@@ -26,7 +26,7 @@ from quietbus.dynamics.vibration import (
     rotor_forces,
     vibration,
 )
-from quietbus.model.cmg import ORDERS
+from quietbus.model.disturbance import orders_of
 from quietbus.model.satellite import Satellite
 
 
@@ -128,7 +128,7 @@ def filtered_jitter(satellite: Satellite, gimbal_angle: Float[Array, " cmg"]) ->
     platform = held_platform(slow, legs, bodies)
     isolated = vibration(satellite, slow, moments, legs)
     rigid = vibration(replace(satellite, mount="rigid"), slow, moments, legs)
-    forces = rotor_forces(slow, moments)
+    forces = rotor_forces(satellite, slow, moments)
 
     def line(s: Complex[Array, ""], force: Complex[Array, "12"]) -> FilteredJitter:
         standing = s == 0.0  # a rotor that stands still shakes nothing
@@ -149,7 +149,7 @@ def filtered_jitter(satellite: Satellite, gimbal_angle: Float[Array, " cmg"]) ->
             rigid=rate(rigid, force[:6]),
         )
 
-    s = 1j * moments.rotor_speed[:, None] * jnp.array(ORDERS)
+    s = 1j * moments.rotor_speed[:, None] * orders_of(satellite.disturbance)
     return jax.vmap(jax.vmap(line))(s, jnp.swapaxes(forces, 0, 1))
 
 

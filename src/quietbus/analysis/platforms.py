@@ -31,7 +31,8 @@ from quietbus.dynamics.vibration import (
     rotor_forces,
     vibration,
 )
-from quietbus.model.cmg import ORDERS, ControlMomentGyro
+from quietbus.model.cmg import ControlMomentGyro
+from quietbus.model.disturbance import orders_of
 from quietbus.model.guidance import StepGuidance
 from quietbus.model.satellite import Satellite
 from quietbus.spatial.rotation import quaternion_to_matrix
@@ -94,10 +95,15 @@ class Platforms:
         return cls(satellites, angles, small, force, reaction, rigid, error)
 
     @property
+    def orders(self) -> np.ndarray:
+        """(order,) multiples of rotor speed at which rotors shake, the same on all platforms."""
+        return np.asarray(orders_of(self.satellites[0].disturbance))
+
+    @property
     def frequency(self) -> np.ndarray:
         """(cmg, order) [rad/s]."""
         speeds = np.concatenate([s.cluster.rotor_speed for s in self.satellites])
-        return np.outer(speeds, ORDERS)
+        return np.outer(speeds, self.orders)
 
     @property
     def bolted(self) -> Vibration:
@@ -282,7 +288,8 @@ def as_one_cluster(satellites: Sequence[Satellite]) -> Satellite:
         places = np.asarray(satellite.p_BP_B) + np.asarray(cluster.p_PC_P) @ R_BP.T
         turned.append(replace(cluster, p_PC_P=places, R_PG0=R_BP @ np.asarray(cluster.R_PG0)))
     whole = jax.tree.map(lambda *each: jnp.concatenate(each), *turned)
-    return replace(satellites[0], cluster=whole, q_BP=jnp.array([1.0, 0.0, 0.0, 0.0]))
+    unit = jnp.array([1.0, 0.0, 0.0, 0.0])
+    return replace(satellites[0], cluster=whole, q_BP=unit, disturbance=None, motor=None)
 
 
 def _equations(
@@ -324,7 +331,7 @@ def _platform(satellite: Satellite, gimbal_angle: Float[Array, " cmg"]) -> _Part
         small.M,
         small.C,
         small.K,
-        rotor_forces(slow, moments),
+        rotor_forces(satellite, slow, moments),
         gimbal_reaction(slow, moments),
         slow,
     )
