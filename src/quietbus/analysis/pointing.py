@@ -138,6 +138,8 @@ class _Judge:
             self.base = motion.phasors(self.centers)
             self.rotors = int(np.max(self.lines.rotor)) + 1
             self.f = self.lines.frequency_hz
+            u = np.pi * self.f * metric.window
+            self.same, self.other = (left_over(u[:, None], side, 2) for side in (u, -u))
         self.slow = _slow(signal, metric, self.centers, self.at)
         self.band = (
             signal.mean_square_above(metric.above, start, end) if metric.name == "rms" else None
@@ -201,11 +203,8 @@ class _Judge:
 
     def _jitter_of_lines(self, z: np.ndarray) -> np.ndarray:
         """(n, c, c) of coherent lines z about their mean and slope, exactly."""
-        u = np.pi * self.f * self.metric.window
-        same = left_over(u[:, None], u, 2)
-        other = left_over(u[:, None], -u, 2)
-        mixed = np.einsum("gh,nhb->ngb", same, z.conj()) + np.einsum("gh,nhb->ngb", other, z)
-        return np.asarray(0.5 * np.einsum("nga,ngb->nab", z, mixed).real)
+        mixed = self.same @ z.conj() + self.other @ z
+        return np.asarray(0.5 * (z.swapaxes(1, 2) @ mixed).real)
 
     def average(self, phases: Phases) -> float:
         """Root mean square over windows and members; of MTF_loss the mean."""
