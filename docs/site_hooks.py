@@ -33,7 +33,13 @@ def _listed(item, docs):
     ((title, target),) = item.items()
     if not target.endswith("/"):
         return item
-    return {title: sorted(page.relative_to(docs).as_posix() for page in docs.glob(f"{target}*.md"))}
+    pages = sorted(docs.glob(f"{target}*.md"), key=lambda page: _number(page.name))
+    return {title: [page.relative_to(docs).as_posix() for page in pages]}
+
+
+def _number(name):
+    """9 of 9-reproduce.md, so that it comes before 10."""
+    return int(name.partition("-")[0]), name
 
 
 def on_files(files, config):

@@ -190,8 +190,10 @@ def _keys(model: type[Part], prefix: str = ""):
         if model in (Unit, Wheel):
             parts = []  # its rotor and other parts have the keys of the cluster's
         yield key, (bool(parts), unit, default)
+        named = typing.get_origin(_bare(hints[name])) is dict
         for part in parts:
-            yield from _keys(part, f"{key}[]." if listed else f"{key}.")
+            below = f"{key}[]." if listed else f"{key}.NAME." if named else f"{key}."
+            yield from _keys(part, below)
 
 
 _COUNTS = {UnitCount}  # whole numbers
@@ -205,7 +207,8 @@ def _contents(annotation):
         origin, arguments = typing.get_origin(item), typing.get_args(item)
         if origin is tuple and arguments[-1] is Ellipsis:
             # one part for all legs or a list of them is written once, as one part
-            listed = listed or (_is_part(arguments[0]) and arguments[0] not in parts)
+            inside = _contents(arguments[0])[0]
+            listed = listed or (bool(inside) and not set(inside) & set(parts))
             left.insert(0, arguments[0])
         elif _is_part(item):
             parts += [item] if item not in parts else []
@@ -214,6 +217,11 @@ def _contents(annotation):
         elif origin is not typing.Literal:
             left[:0] = [*arguments, *getattr(item, "__metadata__", ())]
     return parts, units, listed
+
+
+def _bare(annotation):
+    """A type without what annotates it."""
+    return annotation.__origin__ if hasattr(annotation, "__metadata__") else annotation
 
 
 def _is_part(item) -> bool:

@@ -4,8 +4,8 @@ import concurrent.futures
 import threading
 import time
 import warnings
-from collections.abc import Callable, Mapping
-from typing import Literal
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal
 
 import jax.numpy as jnp
 import numpy as np
@@ -17,12 +17,17 @@ from quietbus.dynamics.linearize import Actuator, LinearModel, OperatingPoint
 from quietbus.dynamics.linearize import linearize as linearize_satellite
 from quietbus.dynamics.vibration import View
 from quietbus.jitter_study import JitterStudy
+from quietbus.platform_study import PlatformStudy
+from quietbus.resolution import refuse_coarse_output, refuse_coarse_tolerance, ripple_unseen
 from quietbus.results import aliasing, rotor_notes, to_dataset
-from quietbus.scenario import Scenario, load_scenario
+from quietbus.scenario import LineOfSight, Problem, Scenario, ScenarioError, load_scenario
+from quietbus.scenario.pointing import NO_REQUIREMENTS
 from quietbus.scenario.wheels import WheelCluster
 from quietbus.solve.direct import Scheme, Tolerances, integrate
 from quietbus.solve.harmonic import integrate_harmonic, on_periodic_solution
+from quietbus.solve.noise import with_noise
 from quietbus.study import Study
+from quietbus.verification import Verification, check_requirements
 
 Mount = Literal["isolated", "rigid"]
 METHODS = ("direct", "harmonic")
@@ -65,8 +70,8 @@ def simulate(
         joint_forces: also give the constraint forces in the legs' joints (direct, isolated mount).
         points: (3,) points of the bus [m], bus frame, by name, where the jitter of the
             acceleration is wanted (harmonic).
-        lines_of_sight: (3,) directions, bus frame, by name, of which the jitter is wanted
-            (harmonic).
+        lines_of_sight: what the jitter is wanted of, beside the scenario's own: by name a (3,)
+            direction, bus frame, or a (1 to 3, 12) sensitivity as in docs/scenario.md (harmonic).
         progress: called with the simulated time reached [s].
 
     Returns:
@@ -74,10 +79,12 @@ def simulate(
         ``status`` "interrupted" among its attributes, and a QuietbusWarning is given.
 
     Raises:
-        ScenarioError: the scenario is not valid.
+        ScenarioError: the scenario is not valid, or the output rate or tolerance of a direct run
+            is too coarse for a declared disturbance.
         ValueError: an unknown method or mount.
         ResonanceError: an order of a rotor lies on an undamped mode (harmonic).
-        SimulationError: the run diverged; what was computed until then is in its ``run``.
+        SimulationError: the run diverged, or its output rate could not show the gimbal motors'
+            ripple; what was computed until then is in its ``run``.
         KeyboardInterrupt: Ctrl-C before anything was computed.
     """
     if method not in METHODS:
@@ -91,12 +98,17 @@ def simulate(
         if points or lines_of_sight:
             raise ValueError("points and lines_of_sight need method 'harmonic'")
         scenario = _as_run(scenario, mount, duration, output_rate)
+        refuse_coarse_output(scenario)
         run = _direct(scenario, joint_forces, progress)
         notes = tuple(filter(None, [aliasing(scenario)]))
     for note in (*notes, *rotor_notes(run)):
         warnings.warn(note, QuietbusWarning, stacklevel=2)
     if run.attrs["status"] == "stopped":
         raise SimulationError(run.attrs["stop_reason"], run)
+    if method == "direct":
+        unseen = ripple_unseen(scenario, run["gimbal_rate"].to_numpy())
+        if unseen:
+            raise SimulationError(unseen, run)
     if run.attrs["status"] == "interrupted":
         warnings.warn(run.attrs["stop_reason"], QuietbusWarning, stacklevel=2)
     return run
@@ -128,6 +140,7 @@ def compare(
 
         return _direct(_as_run(scenario, mount, duration), False, tell)
 
+    refuse_coarse_output(_as_run(scenario, None, duration))
     warning = aliasing(_as_run(scenario, None, duration))
     if warning:
         warnings.warn(warning, QuietbusWarning, stacklevel=2)
@@ -137,10 +150,13 @@ def compare(
             concurrent.futures.wait(futures.values())
         except KeyboardInterrupt:
             stop.set()
-        runs: dict[str, xr.Dataset] = {mount: future.result() for mount, future in futures.items()}
-    for mount, finished in runs.items():
-        for note in rotor_notes(finished):
-            warnings.warn(f"{mount}: {note}", QuietbusWarning, stacklevel=2)
+        runs: dict[str, xr.Dataset] = {}
+        for mount, future in futures.items():
+            runs[mount] = future.result()
+    for name, done in runs.items():
+        unseen = ripple_unseen(_as_run(scenario, None, duration), done["gimbal_rate"].to_numpy())
+        for note in (*filter(None, [unseen]), *rotor_notes(done)):
+            warnings.warn(f"{name}: {note}", QuietbusWarning, stacklevel=2)
     return runs
 
 
@@ -181,6 +197,72 @@ def jitter(scenario: Scenario | str, gimbal_angle: ArrayLike | None = None) -> J
     """
     scenario = _as_run(scenario, None, None)
     return JitterStudy(scenario, _gimbal_angles(scenario, gimbal_angle))
+
+
+def platforms(
+    scenarios: Sequence[Scenario | str], gimbal_angles: Sequence[ArrayLike] | None = None
+) -> PlatformStudy:
+    """Jitter, modes and control of one bus with several platforms, one for each scenario.
+
+    ``per_cmg_scenarios`` makes such scenarios of one with a single platform.
+
+    Args:
+        scenarios: each the bus with one platform and its CMGs (a scenario, a path, or a built-in's
+            name); bus and control must be the same in all.
+        gimbal_angles: (cmg,) [rad] for each scenario, instead of its own.
+
+    Returns:
+        The study, whose parts are computed when asked for (docs/platforms.md).
+
+    Raises:
+        ScenarioError: a scenario is not valid, or bus or control differ.
+        ValueError: a wrong number of gimbal angles, or a satellite that cannot rest.
+        ResonanceError: an order of a rotor lies on an undamped mode.
+    """
+    loaded = tuple(_as_run(scenario, None, None) for scenario in scenarios)
+    given: list[Any] = [None] * len(loaded) if gimbal_angles is None else list(gimbal_angles)
+    if len(given) != len(loaded):
+        raise ValueError(
+            f"gimbal_angles: expected {len(loaded)} lists, one for each scenario, got {len(given)}"
+        )
+    angles = (_gimbal_angles(s, own) for s, own in zip(loaded, given, strict=True))
+    return PlatformStudy(loaded, tuple(angles))
+
+
+def verify(
+    scenario: Scenario | str,
+    method: str = "harmonic",
+    mount: Mount | None = None,
+    *,
+    duration: float | None = None,
+    output_rate: float | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Verification:
+    """The scenario's pointing requirements, each with value, margin and verdict.
+
+    Args:
+        scenario: a scenario, the path of a scenario file, or a built-in's name.
+        method: "harmonic": slow motion and lines, over all rotor phases. "direct": one run with
+            every rotor turn resolved, the only member of its ensemble.
+        mount, duration, output_rate, progress: as of ``simulate``.
+
+    Returns:
+        The verdicts; ``to_dict()`` gives them all (docs/pointing.md).
+
+    Raises:
+        ScenarioError: the scenario is not valid, has no requirements, or one with windows longer
+            than the stretch that is judged.
+        SimulationError: the run is not complete.
+        ValueError, ResonanceError: as of ``simulate``.
+    """
+    scenario = _as_run(scenario, mount, duration, None if method == "harmonic" else output_rate)
+    if not scenario.requirements:
+        raise ScenarioError(scenario.name, [Problem(NO_REQUIREMENTS, ("requirements",))])
+    check_requirements(scenario, method, scenario.simulation.duration)
+    run = simulate(scenario, method, output_rate=output_rate, progress=progress)
+    if run.attrs["status"] != "complete":
+        raise SimulationError(f"the run is not complete: {run.attrs['stop_reason']}", run)
+    return Verification(run)
 
 
 def linearize(
@@ -237,6 +319,21 @@ def _vector(name: str, value: ArrayLike, size: int) -> np.ndarray:
     return vector
 
 
+def _sensitivity(name: str, given: ArrayLike) -> np.ndarray:
+    """(3, 12) of a direction, or of a matrix with zero rows for what it does not have."""
+    values = np.asarray(given, dtype=float)
+    if values.ndim < 2:
+        direction = _vector(name, given, 3)
+        if not np.any(direction):
+            raise ValueError(f"{name}: expected a direction, got zero")
+        return LineOfSight(direction=tuple(direction / np.linalg.norm(direction))).matrix()
+    if values.ndim != 2 or not 1 <= len(values) <= 3 or values.shape[1] != 12:
+        raise ValueError(f"{name}: expected one to three rows of 12 numbers, got {values.shape}")
+    if not np.all(np.isfinite(values)):
+        raise ValueError(f"{name}: expected finite numbers, got {given!r}")
+    return np.pad(values, ((0, 3 - len(values)), (0, 0)))
+
+
 def _as_run(
     scenario: Scenario | str,
     mount: Mount | None,
@@ -268,10 +365,11 @@ def _direct(
     satellite = build_satellite(scenario)
     settings = scenario.simulation
     state = build_initial_state(scenario, satellite)
+    refuse_coarse_tolerance(scenario, satellite, state)
     if scenario.initial.steady:
         state = on_periodic_solution(satellite, state)
     solution = integrate(
-        satellite,
+        with_noise(satellite, scenario.cluster.seeds, settings.duration),
         state,
         settings.duration,
         settings.output_rate,
@@ -290,13 +388,11 @@ def _harmonic(
 ) -> tuple[xr.Dataset, tuple[str, ...]]:
     """The run, and what the user should know of it."""
     at = [_vector(f"points[{name!r}]", p, 3) for name, p in points.items()]
-    along = [_vector(f"lines_of_sight[{name!r}]", d, 3) for name, d in lines_of_sight.items()]
-    for name, direction in zip(lines_of_sight, along, strict=True):
-        if not np.any(direction):
-            raise ValueError(f"lines_of_sight[{name!r}]: expected a direction, got zero")
+    own = {name: line.matrix() for name, line in scenario.lines_of_sight.items()}
+    lines_of_sight = own | dict(lines_of_sight)
+    along = [_sensitivity(f"lines_of_sight[{n!r}]", given) for n, given in lines_of_sight.items()]
     view = View(
-        jnp.asarray(np.array(at).reshape(-1, 3)),
-        jnp.asarray(np.array([d / np.linalg.norm(d) for d in along]).reshape(-1, 3)),
+        jnp.asarray(np.array(at).reshape(-1, 3)), jnp.asarray(np.array(along).reshape(-1, 3, 12))
     )
     started = time.perf_counter()
     satellite = build_satellite(scenario)

@@ -18,6 +18,8 @@ from quietbus.dynamics.state import State
 from quietbus.model.body import Bus, Plate
 from quietbus.model.cmg import ControlMomentGyro
 from quietbus.model.controller import GimbalServo, PIDController
+from quietbus.model.disturbance import CHANNELS, Disturbance, Spectra, Spectrum
+from quietbus.model.gimbal_motor import GimbalMotor
 from quietbus.model.guidance import EigenaxisSlew, Guidance, StepGuidance
 from quietbus.model.hexapod import Hexapod, LegParts
 from quietbus.model.load import Constant, HalfSine, Load, Profile, Step, Table
@@ -31,6 +33,7 @@ from quietbus.model.steering import (
 )
 from quietbus.scenario import Scenario
 from quietbus.scenario import control as scenario_control
+from quietbus.scenario import disturbance as scenario_disturbance
 from quietbus.scenario import hardware as scenario_hardware
 from quietbus.scenario.wheels import Wheel, WheelCluster
 
@@ -69,6 +72,8 @@ def build_satellite(
         steering=_steering(scenario.control),
         loads=tuple(_load(load) for load in scenario.loads),
         mount=mount or isolator.mount,
+        disturbance=_disturbance(cluster),
+        motor=_gimbal_motor(cluster),
     )
     if scenario.control is None:
         return satellite
@@ -201,6 +206,91 @@ def _unit(unit: scenario_hardware.Unit | Wheel, phase: float) -> ControlMomentGy
         eccentricity=_array(rotor.static_imbalance / rotor.mass),
         rotor_speed=_array(rotor.speed),
         rotor_phase=_array(phase),
+    )
+
+
+def _disturbance(cluster: scenario_hardware.Cluster | WheelCluster) -> Disturbance | None:
+    """Of all rotors, at the orders of all tables; None if no rotor has any."""
+    placed: tuple[scenario_hardware.Unit | Wheel, ...] = cluster.placed()
+    each = [unit.rotor.disturbance if unit.rotor else None for unit in placed]
+    if not any(each):
+        return None
+    orders = cluster.orders
+    shape = (len(each), len(orders), len(CHANNELS))
+    coefficient, phase = np.zeros(shape), np.zeros(shape)
+    period, damping = np.zeros((2, len(each), 3))
+    spectra: list[Spectra] = []
+    for j, own in enumerate(each):
+        spectra.append(_spectra(own))
+        if own is None:
+            continue
+        # drawn for all lines, whether random or not, so that a phase given changes no other
+        generator = np.random.default_rng([own.seed, j])
+        drawn = generator.uniform(-np.pi, np.pi, (len(own.orders or ()), len(CHANNELS)))
+        for line, any_phase in zip(own.orders or (), drawn, strict=True):
+            k = orders.index(line.order)
+            for name, channels in _COMPONENTS.items():
+                channel = channels[0] if line.whirl == "forward" else channels[-1]
+                given = line.phase_of(name)
+                coefficient[j, k, channel] += getattr(line, name)
+                if getattr(line, name):
+                    phase[j, k, channel] = any_phase[channel] if given == "random" else given
+        modes = own.resonances
+        for m, mode in enumerate((modes.radial, modes.axial, modes.rocking)):
+            if mode is not None:
+                period[j, m], damping[j, m] = 0.5 / (np.pi * mode.frequency), mode.damping
+    return Disturbance(
+        order=_array(orders),
+        imbalance_at=(orders.index(1), orders.index(2)),
+        coefficient=_array(coefficient),
+        phase=_array(phase),
+        period=_array(period),
+        damping=_array(damping),
+        broadband=tuple(spectra),
+    )
+
+
+# channels of a component that turns forward and backward, or has one only
+_COMPONENTS = {
+    "radial_force": (0, 1),
+    "axial_force": (2,),
+    "radial_torque": (3, 4),
+    "axial_torque": (5,),
+}
+
+
+def _spectra(disturbance: scenario_disturbance.Disturbance | None) -> Spectra:
+    """Spectra of one rotor by component."""
+    given = disturbance.broadband.given() if disturbance else {}
+
+    def spectrum(name: str) -> Spectrum | None:
+        if name not in given:
+            return None
+        table = given[name]
+        logarithmic = table.interpolation == "log"
+        return Spectrum(_array(table.frequency), _array(table.psd), logarithmic)
+
+    radial, axial, rocking, about = (spectrum(name) for name in _COMPONENTS)
+    return radial, axial, rocking, about
+
+
+def _gimbal_motor(cluster: scenario_hardware.Cluster | WheelCluster) -> GimbalMotor | None:
+    motor = cluster.gimbal_motor
+    if motor is None or isinstance(cluster, WheelCluster):
+        return None
+    ripple, stepping = motor.ripple or (), motor.stepping
+    steps = stepping.steps_per_turn if stepping else 1
+    harmonic = 1 + np.arange(stepping.harmonics if stepping else 0)
+    holding = motor.holding_bandwidth
+    return GimbalMotor(
+        per_turn=_array([line.per_turn for line in ripple]),
+        torque=_array([line.torque for line in ripple]),
+        phase=_array([line.phase for line in ripple]),
+        holding=_array(0.1 * cluster.gimbal_bandwidth if holding is None else holding),
+        step_per_turn=_array(harmonic * steps),
+        step_turn=_array(2.0 / (harmonic * steps)),
+        step_frequency=_array(2.0 * np.pi * stepping.frequency if stepping else 1.0),
+        step_damping=_array(stepping.damping if stepping else 1.0),
     )
 
 

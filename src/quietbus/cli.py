@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.table import Table
 
+    from quietbus.jitter_study import JitterStudy
     from quietbus.scenario import Scenario
     from quietbus.study import Study
     from quietbus.validate import Check
@@ -166,6 +167,7 @@ def simulate(
         raise _BadInput("--joint-forces needs --method direct")
     if joint_forces and chosen == Mount.rigid:
         raise _BadInput("--joint-forces needs the isolated mount: a rigid one leaves them open")
+    failed = ""
     with _keeping_results():
         with _progress({chosen: checked.simulation.duration}) as tell, _notes():
             try:
@@ -177,7 +179,7 @@ def simulate(
                     progress=lambda t: tell(chosen, t),
                 )
             except api.SimulationError as error:
-                run = error.run
+                run, failed = error.run, str(error)
             except ResonanceError as error:
                 raise _BadInput(f"{scenario}: {error}") from None
         troubles = _save(run, output)
@@ -187,6 +189,8 @@ def simulate(
         print("one instant only, so there is no table")
     if run.attrs["status"] != "complete":
         troubles.append(f"the run is not complete: {run.attrs['stop_reason']}")
+    elif failed:
+        troubles.append(failed)
     if troubles:
         _fail("; ".join(troubles))
 
@@ -397,9 +401,14 @@ def jitter(
         bool, typer.Option("--json", help="Print one JSON object and nothing else; no pictures.")
     ] = False,
     gimbal_angles: AnglesOption = None,
+    max_speed: Annotated[
+        str | None,
+        typer.Option(help="'7000 rpm' of the fastest rotor, end of the sweep; default 1.2 x own."),
+    ] = None,
 ) -> None:
-    """Jitter at each rotor order with the isolator and without, its budget and worst angles."""
+    """Jitter at each rotor order with the isolator and without, and over the rotors' speed."""
     checked = _at_angles(_load(scenario, None, None), gimbal_angles)
+    most = None if max_speed is None else _speed(max_speed)
     if not as_json:
         _make_folder(output)
     _import_heavy()
@@ -409,18 +418,159 @@ def jitter(
         with _status() as tell:
             tell("computing (compiles for some seconds the first time)")
             study = api.jitter(checked)
-            numbers = study.to_dict()
+            numbers = study.to_dict(most)
     except ValueError as error:
         raise _BadInput(f"{scenario}: {error}") from None
     if as_json:
         print(json.dumps(numbers, indent=2, allow_nan=False))
         return
-    from quietbus.plots import jitter_figures
     from quietbus.tables import jitter_tables
 
     for table in jitter_tables(numbers):
         _print(table)
-    _write_study("jitter", numbers, lambda: jitter_figures(study), output)
+    _write_study("jitter", numbers, lambda: _jitter_pictures(study, most), output)
+
+
+def _jitter_pictures(study: JitterStudy, max_speed: float | None) -> dict[str, Figure]:
+    from quietbus.plots import jitter_figures, sweep_figures
+
+    figures = jitter_figures(study)
+    if not study.frequency.any():  # no rotor turns
+        return figures
+    return figures | sweep_figures(study.sweep(max_speed), study.scenario.name)
+
+
+def _speed(text: str) -> float:
+    """A positive angular velocity [rad/s]."""
+    from pydantic_core import PydanticCustomError
+
+    from quietbus.scenario.units import Quantity
+
+    try:
+        return Quantity("an angular velocity", "rad/s", above=0.0).read(text)
+    except PydanticCustomError as error:
+        raise _BadInput(f"--max-speed: {error}") from None
+
+
+@app.command("import")
+def import_(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="CSV, S2E's .ini or .csv, 42's Whl_*.txt.")
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="YAML file, replaced if old; default: print."),
+    ] = None,
+    kind: Annotated[
+        str | None, typer.Option(help="radial_force, ...; where the file does not say it.")
+    ] = None,
+) -> None:
+    """A harmonic table of a rotor as the scenario's block `disturbance`."""
+    from quietbus.scenario import read_wheel_table
+    from quietbus.scenario.wheel_files import KINDS
+
+    if kind is not None and kind not in KINDS:
+        raise _BadInput(f"--kind: expected one of {', '.join(KINDS)}, got '{kind}'")
+    table = read_wheel_table(file, kind)
+    for lost in table.lost:
+        print(f"note: not taken over: {lost}", file=sys.stderr)
+    for note in table.notes:
+        print(f"note: {note}", file=sys.stderr)
+    _write_block(table.to_yaml(), output)
+
+
+def _write_block(text: str, output: Path | None) -> None:
+    if output is None:
+        print(text, end="")
+        return
+    _check_file(output)
+    output.write_text(text, encoding="utf-8")
+    print(f"wrote {output}")
+
+
+@app.command()
+def fit(
+    file: Annotated[
+        Path, typer.Argument(metavar="MAP", help="A measured waterfall, CSV or NetCDF.")
+    ],
+    output: FolderOption = Path("out"),
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON object and nothing else; no pictures.")
+    ] = False,
+    most: Annotated[int, typer.Option(min=1, help="Orders looked for in each component.")] = 20,
+) -> None:
+    """Fit orders, resonances and broadband floor to a measured speed-frequency map of a rotor."""
+    from quietbus.analysis.waterfall import FitError
+    from quietbus.measured import fit_waterfall
+
+    if not as_json:
+        _make_folder(output)
+    try:
+        with _status() as tell:
+            tell("fitting")
+            fitted = fit_waterfall(file, most)
+    except FitError as error:
+        raise _BadInput(f"{file}: {error}") from None
+    if as_json:
+        print(json.dumps(fitted.to_dict(), indent=2, allow_nan=False))
+        return
+    from quietbus.plots.waterfall import waterfall_figures
+    from quietbus.tables import fit_tables
+
+    for table in fit_tables(fitted):
+        _print(table)
+    (output / "disturbance.yaml").write_text(fitted.to_yaml(), encoding="utf-8")
+    _write_study("fit", fitted.to_dict(), lambda: waterfall_figures(fitted), output)
+
+
+@app.command()
+def verify(
+    scenario: ScenarioArgument,
+    output: FolderOption = Path("out"),
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON object and nothing else; no pictures.")
+    ] = False,
+    method: Annotated[
+        Method,
+        typer.Option(help="harmonic: over all rotor phases; direct: one run, every rotor turn."),
+    ] = Method.harmonic,
+    mount: Annotated[Mount | None, typer.Option(help="Instead of the scenario's mount.")] = None,
+    duration: DurationOption = None,
+) -> None:
+    """Judge the scenario's pointing requirements: value, margin, verdict. Status 1: one not met."""
+    checked = _load(scenario, mount, duration)
+    if not checked.requirements:
+        from quietbus.scenario.pointing import NO_REQUIREMENTS
+
+        raise _BadInput(f"{scenario}: requirements: {NO_REQUIREMENTS}")
+    if not as_json:
+        _make_folder(output)
+    _import_heavy()
+    from quietbus import api
+    from quietbus.solve.harmonic import ResonanceError
+
+    try:
+        with _progress({method.value: checked.simulation.duration}) as tell, _notes():
+            verification = api.verify(
+                checked, method.value, progress=lambda t: tell(method.value, t)
+            )
+    except api.SimulationError as error:
+        _fail(str(error))
+    except ResonanceError as error:
+        raise _BadInput(f"{scenario}: {error}") from None
+    numbers = verification.to_dict()
+    if as_json:
+        print(json.dumps(numbers, indent=2, allow_nan=False))
+    else:
+        from quietbus.plots import pointing_figures
+        from quietbus.tables import verification_tables
+
+        for part in verification_tables(numbers):
+            print(part) if isinstance(part, str) else _print(part)
+        _write_study("verification", numbers, lambda: pointing_figures(verification), output)
+    missed = [f"{v.name} of {v.line_of_sight}" for v in verification.verdicts if not v.met]
+    if missed:
+        _fail(f"{len(missed)} of {len(verification.verdicts)} not met: {'; '.join(missed)}")
 
 
 @app.command()

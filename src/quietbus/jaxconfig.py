@@ -5,13 +5,21 @@ the environment (``JAX_COMPILATION_CACHE_DIR``, ``XLA_FLAGS``, ``EQX_ON_ERROR``)
 """
 
 import os
+from importlib.metadata import version
 
 # XLA runs each small operation of a loop as a kernel of its own, with an overhead as large as the
 # operation. Loops that touch less than this many bytes are compiled as one function instead, which
 # makes an integration step about twice as fast. XLA ignores the option where it does not know it.
-_SMALL_LOOP = "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=100000000"
-if "xla_backend_extra_options" not in os.environ.get("XLA_FLAGS", ""):
-    os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {_SMALL_LOOP}".strip()
+_FLAGS = {
+    "xla_backend_extra_options": "xla_cpu_small_while_loop_byte_threshold=100000000",
+}
+# Compilation takes a third less time without the new emitters, and programs run as fast. XLA ends
+# the process where it does not know a flag, so only for versions that do.
+if (0, 6) <= tuple(int(part) for part in version("jaxlib").split(".")[:2]) < (0, 11):
+    _FLAGS["xla_cpu_use_fusion_emitters"] = "false"
+_given = os.environ.get("XLA_FLAGS", "")
+_added = [f"--{flag}={value}" for flag, value in _FLAGS.items() if flag not in _given]
+os.environ["XLA_FLAGS"] = " ".join([_given, *_added]).strip()
 
 # Diffrax checks its arguments through callbacks into Python, and JAX does not keep programs with
 # callbacks in its cache. A failed check shows as NaN instead, which every run looks for.

@@ -13,26 +13,29 @@ import numpy as np
 
 from quietbus.analysis.channels import json_ready
 from quietbus.analysis.jitter import (
+    AT_REST,
     KINDS,
     SEARCHED,
     Combined,
     WorstAngles,
     budget,
     combine,
+    for_designs,
     imbalance_kinds,
     rest_error,
     steady_jitter,
     worst_angles,
 )
+from quietbus.analysis.sweep import SpeedSweep, SpinningModes, critical_speeds
 from quietbus.build import build_satellite
-from quietbus.dynamics.vibration import Vibration
-from quietbus.model.cmg import ORDERS
+from quietbus.dynamics.vibration import NOTHING_SEEN, Vibration
 from quietbus.model.satellite import Satellite
 from quietbus.scenario import Scenario, ScenarioError
 from quietbus.solve.harmonic import refuse_resonance
+from quietbus.solve.noise import Broadband, noise_spectra
 
 MOUNTS = ("isolated", "rigid")
-AT_REST = 1e-6  # [m/s^2, rad/s^2] accelerations smaller than this are none
+SWEPT = 1.2  # times the rotors' own speed: where a sweep ends unless told otherwise
 ARCSEC = np.rad2deg(1.0) * 3600.0
 # differences of the scenario's algebra: offsets in steps and weights
 _CENTRAL: tuple[tuple[int, ...], np.ndarray] = (
@@ -72,8 +75,7 @@ class JitterStudy:
                     "--method harmonic`"
                 )
             modes = np.linalg.eigvals(small.state_matrix())
-            speeds = np.asarray(self.satellite(mount).cluster.rotor_speed)
-            refuse_resonance(speeds, f"with mount {mount}", modes)
+            refuse_resonance(self.satellite(mount), f"with mount {mount}", modes)
 
     @property
     def wheels(self) -> bool:
@@ -88,10 +90,15 @@ class JitterStudy:
     def _satellites(self) -> dict[str, Satellite]:
         return {mount: build_satellite(self.scenario, mount) for mount in MOUNTS}  # type: ignore[arg-type]
 
+    @property
+    def orders(self) -> tuple[float, ...]:
+        """Multiples of rotor speed: of imbalance, and of the rotors' tables."""
+        return self.scenario.cluster.orders
+
     @cached_property
     def frequency(self) -> np.ndarray:
         """(cmg, order) [rad/s]."""
-        return np.outer(self.satellite("isolated").cluster.rotor_speed, ORDERS)
+        return np.outer(self.satellite("isolated").cluster.rotor_speed, self.orders)
 
     @cached_property
     def _at_rest(self) -> dict[str, tuple[dict[str, np.ndarray], Vibration]]:
@@ -114,8 +121,34 @@ class JitterStudy:
     def combined(self, mount: str, output: str = "bus_rate") -> Combined:
         """All rotors and orders together, in the output's unit."""
         values = self.outputs[mount][output]
-        phase = np.outer(self.satellite(mount).cluster.rotor_phase, ORDERS)
-        return combine(values, self.frequency, phase)
+        phase = np.outer(self.satellite(mount).cluster.rotor_phase, self.orders)
+        combined = combine(values, self.frequency, phase)
+        noise = self.noise(mount)
+        return combined if noise is None else combined.with_noise(noise.variance(output, 1)[0])
+
+    def noise(self, mount: str) -> Broadband | None:
+        """Spectra of the answer to the rotors' broadband disturbance; None if there is none.
+
+        Their ``psd`` has a leading axis of one instant, then frequencies and rotors.
+        """
+        return self._noise[mount]
+
+    @cached_property
+    def _noise(self) -> dict[str, Broadband | None]:
+        found: dict[str, Broadband | None] = {}
+        for mount in MOUNTS:
+            satellite, small = self.satellite(mount), self._at_rest[mount][1]
+            found[mount] = None
+            if satellite.disturbance is not None and satellite.disturbance.noisy:
+                modes = np.linalg.eigvals(jax.tree.map(lambda leaf: leaf[0], small).state_matrix())
+                spectra = noise_spectra(satellite, small, modes, NOTHING_SEEN)
+                found[mount] = Broadband(np.zeros(1, int), *spectra)
+        return found
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """What the budget tells apart."""
+        return KINDS[:-1] if self.satellite("isolated").disturbance is None else KINDS
 
     @cached_property
     def budget(self) -> dict[str, np.ndarray]:
@@ -124,7 +157,7 @@ class JitterStudy:
         for mount in MOUNTS:
             variants = imbalance_kinds(self.satellite(mount))
             values = jitter_of_designs(variants, self.gimbal_angle)["bus_rate"]
-            parts[mount] = budget(self.bus_rate(mount), *values)
+            parts[mount] = budget(self.bus_rate(mount), *values)[: len(self.kinds)]
         return parts
 
     def worst(self, mount: str) -> WorstAngles:
@@ -133,6 +166,56 @@ class JitterStudy:
         return worst_angles(
             lambda angles: worst_case_norm(jitter_of_designs(same, angles)["bus_rate"]),
             len(self.gimbal_angle),
+        )
+
+    def sweep(self, max_speed: float | None = None, count: int = 256) -> SpeedSweep:
+        """Jitter and modes as the speed of all rotors rises together from rest.
+
+        Args:
+            max_speed: [rad/s] of the fastest rotor; by default 1.2 times its own.
+            count: of the speeds, close to each other near rest; the rotors' own and the critical
+                speeds are added.
+
+        Raises:
+            ValueError: no rotor turns, or the speed is not positive.
+        """
+        own = np.asarray(self.satellite("isolated").cluster.rotor_speed)
+        fastest = float(np.max(np.abs(own)))
+        if fastest == 0.0:
+            raise ValueError("a sweep of the rotors' speed needs one that turns")
+        most = SWEPT if max_speed is None else max_speed / fastest
+        if not (np.isfinite(most) and most > 0.0 and count >= 2):
+            raise ValueError(
+                "expected a positive max_speed in rad/s and two speeds or more; got "
+                f"{max_speed} and {count}"
+            )
+        factor = np.append(np.geomspace(1e-3, 1.0, count // 2), np.linspace(0, 1, count // 2 + 1))
+        factor = np.unique(np.append(most * factor, 1.0 if most >= 1.0 else most))
+        modes, critical = {}, {}
+        for mount in MOUNTS:
+            ends = np.array([0.0, 0.5 * most, most])
+            modes[mount] = SpinningModes.between(self._at_speeds(mount, ends)[1], ends)
+            critical[mount] = critical_speeds(modes[mount], own, self.orders, most)
+        crossed = [found.factor for each in critical.values() for found in each]
+        factor = np.unique(np.append(factor, crossed))
+        bus_rate = {}
+        for mount in MOUNTS:
+            rate = self._at_speeds(mount, factor)[0]["bus_rate"]
+            rate[factor == 0.0] = 0.0  # steering by standing rotors has no meaning
+            bus_rate[mount] = rate
+        phase = np.asarray(self.satellite("isolated").cluster.rotor_phase)
+        return SpeedSweep(factor, own, phase, self.orders, bus_rate, modes, critical)
+
+    def _at_speeds(
+        self, mount: str, factors: np.ndarray
+    ) -> tuple[dict[str, np.ndarray], Vibration]:
+        own = self.satellite(mount)
+        designs = [
+            eqx.tree_at(lambda s: s.cluster.rotor_speed, own, factor * own.cluster.rotor_speed)
+            for factor in factors
+        ]
+        return _compute(
+            designs, np.broadcast_to(self.gimbal_angle, (len(designs), len(self.gimbal_angle)))
         )
 
     def derivative(
@@ -178,8 +261,12 @@ class JitterStudy:
             *built,
         )
 
-    def to_dict(self) -> dict[str, Any]:
-        """For JSON, with the keys of the interface; see docs/jitter.md."""
+    def to_dict(self, max_speed: float | None = None) -> dict[str, Any]:
+        """For JSON, with the keys of the interface; see docs/jitter.md.
+
+        Args:
+            max_speed: where the sweep ends, as of ``sweep``; there is none if no rotor turns.
+        """
         own = self.scenario.isolator.mount
         size = {mount: np.abs(self.bus_rate(mount)) for mount in MOUNTS}
         turn = {mount: np.abs(self.outputs[mount]["bus_attitude"]) for mount in MOUNTS}
@@ -199,7 +286,7 @@ class JitterStudy:
                 **ratio(size["isolated"][j, k], size["rigid"][j, k]),
             }
             for j in range(len(self.gimbal_angle))
-            for k, h in enumerate(ORDERS)
+            for k, h in enumerate(self.orders)
         ]
         together = {mount: self._combined_dict(mount) for mount in MOUNTS}
         envelope = {mount: self.combined(mount).envelope for mount in MOUNTS}
@@ -231,20 +318,28 @@ class JitterStudy:
                             "order": h,
                             "bus_rate_amplitude_deg_s": np.rad2deg(np.abs(part[i, j, k])),
                         }
-                        for i, kind in enumerate(KINDS)
+                        for i, kind in enumerate(self.kinds)
                         for j in range(len(self.gimbal_angle))
-                        for k, h in enumerate(ORDERS)
+                        for k, h in enumerate(self.orders)
                     ]
                     for mount, part in self.budget.items()
                 },
                 "worst": worst,
+                "sweep": self.sweep(max_speed).to_dict() if np.any(self.frequency) else None,
             }
         )
 
     def _combined_dict(self, mount: str) -> dict[str, Any]:
         rate, turn = self.combined(mount), self.combined(mount, "bus_attitude")
         kinds = ("envelope", "worst_case", "rss", "rms")
+        noise = self.noise(mount)
+        rms = {
+            output: np.sqrt(noise.variance(output, 1)[0]) if noise else np.zeros(3)
+            for output in ("bus_rate", "bus_attitude")
+        }
         return {
+            "bus_rate_noise_rms_deg_s": np.rad2deg(rms["bus_rate"]),
+            "bus_attitude_noise_rms_arcsec": ARCSEC * rms["bus_attitude"],
             **{f"bus_rate_{kind}_deg_s": np.rad2deg(getattr(rate, kind)) for kind in kinds},
             **{f"bus_attitude_{kind}_arcsec": ARCSEC * getattr(turn, kind) for kind in kinds},
         }
@@ -282,19 +377,7 @@ def _compute(
     designs: Sequence[Satellite], angles: np.ndarray
 ) -> tuple[dict[str, np.ndarray], Vibration]:
     """Amplitudes and the equations that they solve, in one program for any number of designs."""
-    parts = []
-    for start in range(0, len(designs), SEARCHED):
-        these = list(designs[start : start + SEARCHED])
-        missing = SEARCHED - len(these)
-        stacked = jax.tree.map(
-            lambda *each: np.stack(each) if eqx.is_array(each[0]) else each[0],
-            *these,
-            *these[-1:] * missing,
-        )
-        at = np.pad(angles[start : start + SEARCHED], ((0, missing), (0, 0)), mode="edge")
-        part = _compiled_designs(stacked, at)
-        parts.append(jax.tree.map(lambda leaf: np.asarray(leaf)[: len(these)], part))  # noqa: B023
-    return jax.tree.map(lambda *each: np.concatenate(each), *parts)
+    return for_designs(_compiled_designs, designs, angles)
 
 
 @eqx.filter_jit

@@ -17,7 +17,6 @@ from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 from quietbus.analysis.jitter import combine
 from quietbus.analysis.residual import residual, shows
 from quietbus.dynamics.outputs import Outputs
-from quietbus.model.cmg import ORDERS
 from quietbus.scenario import Scenario
 from quietbus.scenario.wheels import WheelCluster
 from quietbus.solve.direct import SLOW, Scheme, Solution
@@ -148,7 +147,27 @@ def to_dataset(
         },
     }
     if jitter is not None:
-        coordinates["order"] = ("order", list(ORDERS), {"long_name": "multiple of rotor speed"})
+        if jitter.ripple is not None:
+            lines = list(_ripple_lines(scenario))
+            meaning = "multiple of the gimbal angle"
+            coordinates["ripple"] = ("ripple", lines, {"long_name": meaning})
+        if jitter.broadband is not None:
+            noise = jitter.broadband
+            coordinates["look"] = (
+                "look",
+                solution.time[noise.instants],
+                {"units": "s", "long_name": "time of a spectrum"},
+            )
+            coordinates["frequency"] = (
+                "frequency",
+                noise.frequency,
+                {"units": "Hz", "long_name": "frequency"},
+            )
+        coordinates["order"] = (
+            "order",
+            list(scenario.cluster.orders),
+            {"long_name": "multiple of rotor speed"},
+        )
         for dimension, named in (("point", points), ("line", lines_of_sight)):
             if named:
                 coordinates[dimension] = (dimension, list(named), {"long_name": dimension})
@@ -177,10 +196,10 @@ def to_dataset(
 
 def _rotor_lines(scenario: Scenario, outputs: Outputs) -> tuple[np.ndarray, np.ndarray]:
     """Frequency and phase of each order (..., cmg, order), over time where speeds change."""
-    speed, phase = _rotors(scenario)
+    (speed, phase), orders = _rotors(scenario), np.array(scenario.cluster.orders)
     if outputs.rotor_speed is not None:
         speed, phase = np.asarray(outputs.rotor_speed), np.asarray(outputs.rotor_angle)
-    return speed[..., None] * np.array(ORDERS), phase[..., None] * np.array(ORDERS)
+    return speed[..., None] * orders, phase[..., None] * orders
 
 
 def _jitter_variables(frequency: np.ndarray, angle: np.ndarray, jitter: Jitter) -> dict[str, Any]:
@@ -204,10 +223,54 @@ def _jitter_variables(frequency: np.ndarray, angle: np.ndarray, jitter: Jitter) 
         )
         flat = values.reshape(*values.shape[:3], -1)
         combined = combine(flat, frequency, angle)
+        if jitter.ripple is not None:
+            lines = jitter.ripple[name]
+            data |= _ripple_variables(name, lines, inner, unit, of)
+            combined = combined.with_lines(lines.reshape(len(lines), -1, flat.shape[-1]))
+        if jitter.broadband is not None:
+            psd = jitter.broadband.psd[name]
+            data[f"{name}_psd"] = (
+                ("look", "frequency", "cmg", *inner),
+                psd,
+                {"units": _per_hertz(unit), "long_name": f"{of}: one-sided PSD by rotor noise"},
+            )
+            square = jitter.broadband.variance(name, len(values))
+            combined = combined.with_noise(square.reshape(len(values), -1))
+            data[f"{name}_noise_rms"] = _variable(
+                np.sqrt(square), inner, unit, f"{of}: RMS of the rotors' noise"
+            )
         for kind, said in COMBINED.items():
             whole = getattr(combined, kind).reshape(len(values), *values.shape[3:])
             data[f"{name}_jitter_{kind}"] = _variable(whole, inner, unit, f"{of}: {said}")
     return data
+
+
+def _per_hertz(unit: str) -> str:
+    return f"({unit})^2/Hz"
+
+
+def _ripple_variables(
+    name: str, lines: np.ndarray, inner: tuple[str, ...], unit: str, of: str
+) -> dict[str, Any]:
+    """Amplitudes and phases of what the gimbal motors cause."""
+    dimensions = ("cmg", "ripple", *inner)
+    return {
+        f"{name}_ripple_amplitude": _variable(
+            np.abs(lines), dimensions, unit, f"{of} by gimbal motors: amplitude"
+        ),
+        f"{name}_ripple_phase": _variable(
+            np.angle(lines),
+            dimensions,
+            "rad",
+            f"{of} by gimbal motors: phase against ripple times gimbal angle",
+        ),
+    }
+
+
+def _ripple_lines(scenario: Scenario) -> tuple[int, ...]:
+    """Multiples of the gimbal angle of the gimbal motors' lines, as of ``GimbalMotor.order``."""
+    motor = scenario.cluster.gimbal_motor
+    return motor.lines if motor else ()
 
 
 def _rotors(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
@@ -237,6 +300,7 @@ def reconstruct(
     Returns:
         Slow motion and jitter together, or the jitter alone of what is only known as a deviation
         (``bus_attitude``, ``line_of_sight``, ``point_acceleration``; see its ``long_name``).
+        Lines alone: of a broadband disturbance a run has spectra (``NAME_psd``), not a signal.
 
     Raises:
         ValueError: a run that is not harmonic, an unknown name, or times outside the run.
@@ -257,7 +321,8 @@ def reconstruct(
     speed, phase = _rotors(scenario_of(run))
     if "rotor_speed" in run:
         speed = run["rotor_speed"].to_numpy()
-    fastest = max(ORDERS) * np.max(np.abs(speed)) / (2.0 * np.pi)
+    orders = run["order"].to_numpy()
+    fastest = max(orders) * np.max(np.abs(speed)) / (2.0 * np.pi)
     rate = rate or 40.0 * max(fastest, 1.0)
     first, last = max(time[0], around - span / 2), min(time[-1], around + span / 2)
     t = first + np.arange(int((last - first) * rate) + 1) / rate
@@ -269,15 +334,28 @@ def reconstruct(
         angle = run["rotor_angle"].to_numpy() + (t - time)[:, None] * speed
     else:
         angle = CubicHermiteSpline(time, run["rotor_angle"].to_numpy(), speed)(t)
-    turn = np.exp(1j * angle[..., None] * np.array(ORDERS))
+    turn = np.exp(1j * angle[..., None] * orders)
     inner = amplitude.dims[3:]
     values = np.sum((at * turn.reshape(*turn.shape, *[1] * len(inner))).real, axis=(1, 2))
+    if "ripple" in run.dims:
+        values = values + _ripple_signal(run, name, t)
     meaning = f"jitter of {JITTER_VARIABLES[name][2]}"
     if name in run and run[name].dims[1:] == inner:
         values, meaning = values + _interpolated(time, run[name].to_numpy(), t), VARIABLES[name][2]
     coordinates = {"time": t} | {d: run[d] for d in inner if d in run.coords}
     attributes = {"units": amplitude.attrs["units"], "long_name": meaning}
     return xr.DataArray(values, coordinates, ("time", *inner), name, attributes)
+
+
+def _ripple_signal(run: xr.Dataset, name: str, t: np.ndarray) -> np.ndarray:
+    """What the gimbal motors cause of an output at times t."""
+    time = run["time"].to_numpy()
+    amplitude, shift = (run[f"{name}_ripple_{part}"].to_numpy() for part in ("amplitude", "phase"))
+    at = _interpolated(time, amplitude * np.exp(1j * shift), t)
+    gamma = _interpolated(time, run["gimbal_angle"].to_numpy(), t)
+    turn = np.exp(1j * gamma[..., None] * run["ripple"].to_numpy())
+    inner = at.ndim - 3
+    return np.sum((at * turn.reshape(*turn.shape, *[1] * inner)).real, axis=(1, 2))
 
 
 def _interpolated(time, values, t):

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     import numpy as np
 
+    from quietbus.measured import WaterfallFit
     from quietbus.results import Summary
     from quietbus.study import Study
     from quietbus.validate import Check
@@ -234,6 +235,29 @@ def _transmissibility(study: Study) -> Table:
     return table
 
 
+def verification_tables(numbers: Mapping[str, Any]) -> Iterator[Table | str]:
+    """What ``quietbus verify`` says, from ``Verification.to_dict``: a table, and what is meant."""
+    table = _titled(f"{numbers['scenario']}, {numbers['mount']}: pointing, {numbers['method']} run")
+    for column in ("", "metric", "line of sight", "value", "limit", "margin", "verdict"):
+        right = column in ("value", "limit", "margin")
+        table.add_column(column, justify="right" if right else "left")
+    notes = []
+    for i, row in enumerate(numbers["requirements"], 1):
+        unit = "" if row["unit"] == "1" else f" {row['unit']}"
+        table.add_row(
+            str(i),
+            row["name"],
+            row["line_of_sight"],
+            f"{row['value']:.3g}",
+            f"{row['limit']:.3g}{unit}",
+            f"{row['margin_percent']:.1f} %",
+            "met" if row["met"] else "NOT MET",
+        )
+        notes.append(f"{i}: {row['meaning']}; {row['from_s']:g} s to {row['until_s']:g} s")
+    yield table
+    yield from notes
+
+
 def jitter_tables(numbers: Mapping[str, Any]) -> Iterator[Table]:
     """What ``quietbus jitter`` says, from ``JitterStudy.to_dict``."""
     angles = ", ".join(f"{angle:.4g}" for angle in numbers["gimbal_angle_deg"])
@@ -269,12 +293,15 @@ def jitter_tables(numbers: Mapping[str, Any]) -> Iterator[Table]:
     together = _titled("All rotors and orders together")
     for column in ("", "axis", "unit", "isolated", "rigid", "left", "dB"):
         together.add_column(column, justify="right" if column not in ("", "axis") else "left")
-    for title, key in (
+    rows = [
         ("envelope, phases as given", "envelope"),
         ("worst case, any phases", "worst_case"),
         ("root sum of squares", "rss"),
         ("RMS, phases as given", "rms"),
-    ):
+    ]
+    if any(max(combined[m]["bus_rate_noise_rms_deg_s"]) for m in ("isolated", "rigid")):
+        rows.append(("RMS of noise alone", "noise_rms"))
+    for title, key in rows:
         for name, unit in (("bus_rate", "deg_s"), ("bus_attitude", "arcsec")):
             for i, axis in enumerate(AXES):
                 values = [combined[m][f"{name}_{key}_{unit}"][i] for m in ("isolated", "rigid")]
@@ -312,6 +339,69 @@ def jitter_tables(numbers: Mapping[str, Any]) -> Iterator[Table]:
             ", ".join(f"{angle:.1f}" for angle in found["gimbal_angle_deg"]),
         )
     yield worst
+    if numbers["sweep"] is not None:
+        yield critical_table(numbers["sweep"])
+
+
+def critical_table(sweep: Mapping[str, Any]) -> Table:
+    """Speeds at which an order that shakes the bus meets a mode, on the platform."""
+    found = sweep["isolated"]["critical_speeds"]
+    most = sweep["speed_rpm"][-1]
+    table = _titled(f"Critical speeds on the platform, gimbals held, up to {most:.5g} rpm")
+    columns = ("speed\nrpm", "order", "frequency\nHz", "damping\n-", "Q\n-", "bus rate\ndeg/s")
+    for column in columns:
+        table.add_column(column, justify="right")
+    table.add_column("mode of the plate", overflow="fold")
+    shown = [critical for critical in found if critical["excited"]]
+    for critical in shown:
+        table.add_row(
+            f"{critical['speed_rpm']:.1f}",
+            f"{critical['order']:g}",
+            f"{critical['frequency_hz']:.3f}",
+            f"{critical['damping']:.3f}",
+            _number(critical["amplification"]),
+            f"{math.hypot(*critical['bus_rate_amplitude_deg_s']):.2e}",
+            critical["mode"].replace("translation", "along").replace("rotation", "about"),
+        )
+    table.caption = "bus rate: norm of the sums of the rotors' amplitudes" if shown else "none"
+    if len(shown) < len(found):
+        table.caption += "; crossings of orders that shake nothing left out"
+    return table
+
+
+def fit_tables(fitted: WaterfallFit) -> Iterator[Table]:
+    """Fitted numbers of each component of a measured map, with their standard deviations."""
+    for name, each in fitted.components.items():
+        unit = "kg m" if name.endswith("force") else "kg m^2"
+        table = _titled(f"Orders of the {name.replace('_', ' ')}")
+        for column in ("order", "+-", f"coefficient\n{unit}", "+- %", "whirl", "speeds"):
+            table.add_column(column, justify="left" if column == "whirl" else "right")
+        for line, speeds in zip(each.orders, each.line_speed, strict=True):
+            percent = 100.0 * line.coefficient.deviation / line.coefficient.value
+            table.add_row(
+                f"{line.order.value:.4f}",
+                f"{line.order.deviation:.1e}",
+                f"{line.coefficient.value:.3e}",
+                f"{percent:.2g}",
+                line.whirl if each.mode and each.mode.split else "",
+                str(len(speeds)),
+            )
+        said = f"lines: measured over fitted, RMS error {100.0 * each.line_error:.2g} %"
+        if each.mode is not None:
+            mode = each.mode
+            said = (
+                f"mode: {mode.frequency.value:.5g} Hz (+- {mode.frequency.deviation:.1g}), "
+                f"damping {mode.damping.value:.4g} (+- {mode.damping.deviation:.1g})"
+                + (
+                    f", spin over transverse inertia {mode.split.value:.4g}"
+                    f" (+- {mode.split.deviation:.1g})"
+                    if mode.split
+                    else ""
+                )
+                + f"; {said}"
+            )
+        table.caption = said
+        yield table
 
 
 def _left(numbers: Mapping[str, Any], axis: int) -> tuple[str, str]:

@@ -10,6 +10,7 @@ import xarray as xr
 
 import quietbus as qb
 from quietbus import plots
+from quietbus.analysis.jitter import KINDS
 from quietbus.jitter_study import jitter_of_designs
 from quietbus.model.cmg import ORDERS
 from quietbus.plots import (
@@ -326,6 +327,8 @@ def test_a_kind_at_a_second_order_has_its_own_hatched_bar():
     study = SimpleNamespace(
         scenario=SimpleNamespace(name="made up"),
         budget=same,
+        kinds=KINDS[:4],
+        orders=ORDERS,
         gimbal_angle=np.zeros(2),
         bus_rate=lambda _: budget.sum(axis=0),
         combined=lambda _: SimpleNamespace(worst_case=np.full(3, 8e-6)),

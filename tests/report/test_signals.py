@@ -22,7 +22,7 @@ def vibrating(count=5001, rate=1000.0, slow=lambda t: 1e-3 * np.sin(0.3 * t), gr
     return xr.Dataset(
         {"bus_rate": (("time", "axis"), rates)},
         {"time": time},
-        {"scenario": scenario.to_yaml(), "mount": "isolated"},
+        {"scenario": scenario.to_yaml(), "mount": "isolated", "method": "direct"},
     )
 
 

@@ -1,6 +1,7 @@
 """Making, keeping, failing and going on, with a small paper of its own."""
 
 import json
+import math
 import subprocess
 import sys
 from importlib.resources import files
@@ -23,6 +24,7 @@ class Small:
     def __init__(self):
         self.calls = []
         self.trouble = {}
+        self.numbers = {}
         self.paper = Paper(
             "small",
             "Nobody, nowhere",
@@ -42,7 +44,8 @@ class Small:
             self.calls.append(name)
             if name in self.trouble:
                 raise self.trouble[name]
-            return Findings(Figure((1, 1)), f"caption of {name}", {name: 1.0}, f"text of {name}")
+            numbers = {name: self.numbers.get(name, 1.0)}
+            return Findings(Figure((1, 1)), f"caption of {name}", numbers, f"text of {name}")
 
         return make
 
@@ -112,6 +115,15 @@ def test_a_figure_that_fails_leaves_the_others_and_is_named(small, tmp_path):
     assert "no engine" in (tmp_path / "report.md").read_text()
     small.trouble.clear()
     assert reproduce(small.paper, tmp_path).made == ("two",)
+
+
+@pytest.mark.parametrize("odd", [math.nan, math.inf])
+def test_a_number_that_json_cannot_hold_fails_its_part_only(small, tmp_path, odd):
+    small.numbers["two"] = odd
+    outcome = reproduce(small.paper, tmp_path)
+    assert outcome.made == ("one", "three")
+    assert "expected finite numbers, got others for two" in read(tmp_path)["failed"][0]["reason"]
+    assert not (tmp_path / "two.png").exists()
 
 
 def test_an_interrupt_keeps_what_is_made_and_the_next_start_goes_on(small, tmp_path):

@@ -49,7 +49,7 @@ MISTAKES = [
     ("damping: 500 N*s/m", "damping: 500 N/m", "isolator.legs.damping (line {}): expected a damping in N*s/m, got '500 N/m' (a stiffness?)"),
     ("stiffness: 20 kN/m", "stiffness: [20 kN/m, 1 N, 1, 1, 1, 1]", "isolator.legs.stiffness[1] (line {}): expected a stiffness in N/m, got '1 N' (a force?)"),
     ("speed: 6000 rpm", "speed: 100 Hz", "cluster.rotor.speed (line {}): expected an angular velocity in rad/s, got '100 Hz' (turns or radians? write rpm, rev/s, deg/s or rad/s)"),
-    ("output_rate: 1 kHz", "output_rate: 6000 rpm", "simulation.output_rate (line {}): expected a frequency in Hz, got '6000 rpm' (an angular velocity? samples are counted in Hz)"),
+    ("output_rate: 1 kHz", "output_rate: 6000 rpm", "simulation.output_rate (line {}): expected a frequency in Hz, got '6000 rpm' (an angular velocity? frequencies are in Hz)"),
     ("offset: [0, 0, 0.6]", "offset: [0, 0, 0.6 kg]", "isolator.offset[2] (line {}): expected a length in m, got '0.6 kg' (a mass?)"),
     ("attitude: [1.5 deg, 1.5 deg", "attitude: [1.5 deg, 1.5 deg/s", "initial.attitude[1] (line {}): expected an angle in rad, got '1.5 deg/s' (an angular velocity?)"),
     ("momentum: 15 N*m*s", "momentum: 15 N*m", "cluster.rotor.momentum (line {}): expected an angular momentum in N*m*s, got '15 N*m' (a torque?)"),

@@ -76,7 +76,7 @@ def test_quantity_in_si(quantity, text, value):
             RATE,
             "6000 rpm",
             "expected a frequency in Hz, got '6000 rpm' "
-            "(an angular velocity? samples are counted in Hz)",
+            "(an angular velocity? frequencies are in Hz)",
         ),
         (ANGLE, "3 m", "expected an angle in rad, got '3 m' (a length?)"),
         (ANGLE, "3 %", "expected an angle in rad, got '3 %' (turns or radians? write rad)"),

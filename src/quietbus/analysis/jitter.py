@@ -1,9 +1,10 @@
 """Jitter at one operating point, of each rotor, of each kind of imbalance, and of all together."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -14,6 +15,7 @@ from scipy.stats import qmc
 from quietbus.dynamics.closed_loop import initial_state
 from quietbus.dynamics.vibration import (
     NOTHING_SEEN,
+    SlowMotion,
     Vibration,
     leg_coefficients,
     linear_outputs,
@@ -21,10 +23,13 @@ from quietbus.dynamics.vibration import (
     slow_motion,
     vibration,
 )
-from quietbus.model.cmg import ORDERS, ClusterMoments
+from quietbus.model.cmg import ClusterMoments
+from quietbus.model.disturbance import orders_of
 from quietbus.model.guidance import StepGuidance
 from quietbus.model.satellite import Satellite
 
+Result = TypeVar("Result")
+AT_REST = 1e-6  # [m/s^2, rad/s^2] accelerations smaller than this are none
 SAME_FREQUENCY = 1e-9  # relative: lines closer than this are one
 
 
@@ -39,6 +44,21 @@ class Combined:
     worst_case: np.ndarray  # any phases: the sum of all amplitudes
     rss: np.ndarray  # root of the sum of squares of all amplitudes
     rms: np.ndarray  # root mean square in time, phases as given
+
+    def with_lines(self, amplitude: np.ndarray) -> "Combined":
+        """With further lines (..., line, component), each of a frequency of its own."""
+        size = np.abs(amplitude)
+        square = np.sum(size**2, axis=-2)
+        return Combined(
+            envelope=self.envelope + np.sum(size, axis=-2),
+            worst_case=self.worst_case + np.sum(size, axis=-2),
+            rss=np.sqrt(self.rss**2 + square),
+            rms=np.sqrt(self.rms**2 + 0.5 * square),
+        )
+
+    def with_noise(self, square: np.ndarray) -> "Combined":
+        """With noise of a mean square: it has no amplitude, and adds to the RMS alone."""
+        return replace(self, rms=np.sqrt(self.rms**2 + square))
 
 
 def combine(amplitude: np.ndarray, frequency: np.ndarray, phase: np.ndarray) -> Combined:
@@ -93,6 +113,23 @@ def _groups_of_changing(frequency: np.ndarray) -> list[np.ndarray]:
     return masks
 
 
+def at_rest(
+    satellite: Satellite, gimbal_angle: Float[Array, " cmg"]
+) -> tuple[Satellite, SlowMotion, ClusterMoments]:
+    """The satellite at its target, its plate in the nominal pose, free of loads.
+
+    Rotors that run up have their nominal speeds.
+    """
+    unit = jnp.array([1.0, 0.0, 0.0, 0.0])
+    satellite = replace(satellite, guidance=StepGuidance(unit), loads=())
+    state = initial_state(satellite, unit, jnp.zeros(3), gimbal_angle)
+    if satellite.cluster.run_up is not None:
+        state = replace(state, rotor=None)
+    moments = ClusterMoments.expand(satellite.cluster)
+    slow = slow_motion(satellite, jnp.zeros(()), state, moments.averaged())
+    return satellite, slow, moments
+
+
 def steady_jitter(
     satellite: Satellite, gimbal_angle: Float[Array, " cmg"]
 ) -> tuple[dict[str, Complex[Array, "cmg order ..."]], Vibration]:
@@ -102,16 +139,10 @@ def steady_jitter(
     no load acts; ``rest_error`` tells whether that is an equilibrium. Also the equations that the
     amplitudes solve.
     """
-    unit = jnp.array([1.0, 0.0, 0.0, 0.0])
-    satellite = replace(satellite, guidance=StepGuidance(unit), loads=())
-    state = initial_state(satellite, unit, jnp.zeros(3), gimbal_angle)
-    if satellite.cluster.run_up is not None:
-        state = replace(state, rotor=None)  # at the nominal speed
-    moments = ClusterMoments.expand(satellite.cluster)
-    slow = slow_motion(satellite, jnp.zeros(()), state, moments.averaged())
+    satellite, slow, moments = at_rest(satellite, gimbal_angle)
     small = vibration(satellite, slow, moments, leg_coefficients(satellite, slow))
-    xi = rotor_response(small, moments)
-    s = 1j * slow.rotor_speed[:, None] * jnp.array(ORDERS)
+    xi = rotor_response(satellite, small, moments)
+    s = 1j * slow.rotor_speed[:, None] * orders_of(satellite.disturbance)
     outputs = jax.vmap(jax.vmap(lambda s, x: linear_outputs(satellite, small, s, x, NOTHING_SEEN)))
     return outputs(s, xi), small
 
@@ -121,14 +152,24 @@ def rest_error(small: Vibration) -> float:
     return float(np.max(np.abs(small.slow.u_rate)))
 
 
-KINDS = ("static imbalance", "dynamic imbalance", "installation error", "asymmetry and products")
+KINDS = (
+    "static imbalance",
+    "dynamic imbalance",
+    "installation error",
+    "asymmetry and products",
+    "order tables",
+)
 
 
 def imbalance_kinds(satellite: Satellite) -> list[Satellite]:
     """The satellite with static imbalance only, dynamic only, and both without installation error.
 
-    ``budget`` makes the parts of a budget of their jitter.
+    Last the satellite with all imbalance; none has the rotors' tables. ``budget`` makes the parts
+    of a budget of their jitter.
     """
+    if satellite.disturbance is not None:  # kept, so that all have the same orders
+        none = 0.0 * satellite.disturbance.coefficient
+        satellite = replace(satellite, disturbance=replace(satellite.disturbance, coefficient=none))
     cluster = satellite.cluster
     speed_axes = jnp.broadcast_to(jnp.eye(3), cluster.R_GF.shape)
     inertia = cluster.I_RRcm_R
@@ -141,20 +182,32 @@ def imbalance_kinds(satellite: Satellite) -> list[Satellite]:
         {"R_GF": speed_axes, "I_RRcm_R": even},
         {"R_GF": speed_axes, "I_RRcm_R": products, "eccentricity": none},
         {"R_GF": speed_axes},
+        {},
     )
     return [replace(satellite, cluster=replace(cluster, **changes)) for changes in kinds]
 
 
 def budget(
-    whole: np.ndarray, static: np.ndarray, dynamic: np.ndarray, installed_exactly: np.ndarray
+    whole: np.ndarray,
+    static: np.ndarray,
+    dynamic: np.ndarray,
+    installed_exactly: np.ndarray,
+    imbalance: np.ndarray,
 ) -> np.ndarray:
     """Parts of the complex amplitudes by kind (kind, ...), in the order of ``KINDS``.
 
-    Their sum is ``whole``. What the installation error changes is its part; what is left is due to
-    the rotor's unequal transverse inertias and to products of both imbalances.
+    Their sum is ``whole``. What the installation error changes of the imbalance's jitter is its
+    part; what is left of that is due to the rotor's unequal transverse inertias and to products of
+    both imbalances. All beyond imbalance is of the order tables.
     """
     return np.stack(
-        [static, dynamic, whole - installed_exactly, installed_exactly - static - dynamic]
+        [
+            static,
+            dynamic,
+            imbalance - installed_exactly,
+            installed_exactly - static - dynamic,
+            whole - imbalance,
+        ]
     )
 
 
@@ -191,4 +244,31 @@ def worst_angles(measure: Callable[[np.ndarray], np.ndarray], count: int) -> Wor
     return WorstAngles(found.x, -float(found.fun), SEARCHED * int(found.nfev))
 
 
-SEARCHED = 64  # sets of gimbal angles looked at together
+SEARCHED = 64  # sets of gimbal angles, or designs, looked at together
+
+
+def for_designs(
+    program: Callable[[Satellite, np.ndarray], Result],
+    designs: Sequence[Satellite],
+    angles: np.ndarray,
+) -> Result:
+    """What a program gives for many satellites alike but for their numbers, compiled once.
+
+    Args:
+        program: compiled; from SEARCHED satellites, stacked, and their (SEARCHED, cmg) angles.
+        designs: any number of satellites.
+        angles: (design, cmg) [rad].
+    """
+    parts = []
+    for start in range(0, len(designs), SEARCHED):
+        these = list(designs[start : start + SEARCHED])
+        missing = SEARCHED - len(these)
+        stacked = jax.tree.map(
+            lambda *each: np.stack(each) if eqx.is_array(each[0]) else each[0],
+            *these,
+            *these[-1:] * missing,
+        )
+        at = np.pad(angles[start : start + SEARCHED], ((0, missing), (0, 0)), mode="edge")
+        part = program(stacked, at)
+        parts.append(jax.tree.map(lambda leaf: np.asarray(leaf)[: len(these)], part))  # noqa: B023
+    return jax.tree.map(lambda *each: np.concatenate(each), *parts)

@@ -71,18 +71,21 @@ def _modes(A: np.ndarray, states: list[str]) -> list[Mode]:
         shape = rows @ vector
         if np.max(np.abs(shape)) == 0.0:
             continue
-        shape = shape / shape[np.argmax(np.abs(shape))]
-        found.append(
-            Mode(
-                frequency_hz=float(abs(pole) / (2.0 * np.pi)),
-                damped_frequency_hz=float(pole.imag / (2.0 * np.pi)),
-                damping=float(-pole.real / abs(pole)),
-                pole=complex(pole),
-                shape=shape,
-                name=_name(shape),
-            )
-        )
+        found.append(mode_of(pole, shape))
     return sorted(found, key=lambda mode: mode.frequency_hz)
+
+
+def mode_of(pole: complex, shape: np.ndarray) -> Mode:
+    """The mode of a pole [rad/s] and its shape (12,), in space and of any size but zero."""
+    shape = shape / shape[np.argmax(np.abs(shape))]
+    return Mode(
+        frequency_hz=float(abs(pole) / (2.0 * np.pi)),
+        damped_frequency_hz=float(pole.imag / (2.0 * np.pi)),
+        damping=float(-pole.real / abs(pole)),
+        pole=complex(pole),
+        shape=shape,
+        name=_name(shape),
+    )
 
 
 def _name(shape: np.ndarray) -> str:

@@ -9,6 +9,7 @@ from quietbus.dynamics.equations import Accelerations, Wrench, accelerations, pl
 from quietbus.dynamics.kinematics import PlateMotion
 from quietbus.dynamics.state import State
 from quietbus.model.cmg import ClusterMoments, ControlMomentGyro
+from quietbus.model.disturbance import on_plate
 from quietbus.model.rotor import RotorState, WheelMotors
 from quietbus.model.satellite import Satellite
 from quietbus.model.steering import singularity_measure
@@ -107,12 +108,16 @@ def control_signals(satellite: Satellite, t: Float[Array, ""], state: State) -> 
                 share = satellite.servo.share(command)
                 rate_command, delivered = share * command, share * torque
         integral_rate = controller.integral_rate(error, asked, delivered)
+    acceleration = satellite.servo.acceleration(rate_command, state.gimbal_rate)
+    if satellite.motor is not None:
+        gimbals = (state.gimbal_angle, state.gimbal_rate)
+        acceleration += satellite.motor.acceleration(satellite.cluster, *gimbals)
     return ControlSignals(
         error,
         torque,
         integral_rate,
         rate_command,
-        satellite.servo.acceleration(rate_command, state.gimbal_rate),
+        acceleration,
         singularity_measure(A),
         rotor_acceleration,
         torque_share,
@@ -131,6 +136,23 @@ def external_wrench(satellite: Satellite, t: Float[Array, ""], plates: PlateMoti
     return total
 
 
+def disturbance_wrench(
+    satellite: Satellite,
+    t: Float[Array, ""],
+    state: State,
+    rotor_angle: Float[Array, " cmg"],
+    plates: PlateMotion,
+) -> Wrench:
+    """What the rotors do to the plate beyond their imbalance (``model.disturbance``)."""
+    assert satellite.disturbance is not None
+    speed = satellite.cluster.rotor_speed if state.rotor is None else state.rotor.speed
+    each = satellite.disturbance.wrench(satellite.cluster, t, rotor_angle, speed)
+    on_P = on_plate(satellite.cluster, state.gimbal_angle, each[:, None])
+    force, torque = jnp.sum(on_P, axis=(0, 1)).reshape(2, 3)
+    zero = jnp.zeros(3)
+    return Wrench(rotate(plates.R_NP, force), rotate(plates.R_NP, torque), zero, zero)
+
+
 def evaluate(
     satellite: Satellite,
     t: Float[Array, ""],
@@ -141,7 +163,11 @@ def evaluate(
     """Control decisions and accelerations at time t [s]; rotor angles as given or those of t."""
     phi = rotor_angles(satellite, t, state) if rotor_angle is None else rotor_angle
     signals = control_signals(satellite, t, state)
-    wrench = external_wrench(satellite, t, plate_motion(state))
+    plates = plate_motion(state)
+    wrench = external_wrench(satellite, t, plates)
+    if satellite.disturbance is not None:
+        shaking = disturbance_wrench(satellite, t, state, phi, plates)
+        wrench = jax.tree.map(jnp.add, wrench, shaking)
     return signals, accelerations(
         satellite,
         state,

@@ -17,7 +17,7 @@ from quietbus.model.cmg import CarriedMotion, ClusterMoments
 from quietbus.model.satellite import Satellite
 from quietbus.spatial.inertia import point_inertia
 from quietbus.spatial.rotation import quaternion_to_matrix, skew
-from quietbus.spatial.vector import cross, rotate, solve_positive_definite
+from quietbus.spatial.vector import cross, dot, rotate, solve_positive_definite
 
 
 class Wrench(eqx.Module):
@@ -92,10 +92,12 @@ def accelerations(
     f = force(satellite, plates, carried, jnp.zeros(12)) + wrench.on_speeds
     if satellite.mount == "rigid":
         # v_P = v_B + w_B x r and w_P = w_B: the same twelve equations on six speeds
-        T, w_B = rigid_speeds(satellite, plates), plates.w_B
-        r = rotate(plates.R_NB, satellite.p_BP_B)
-        bias = jnp.zeros(12).at[:3].set(cross(w_B, cross(w_B, r)))
-        u_rate = T @ solve_positive_definite(T.T @ M @ T, T.T @ (f - M @ bias)) + bias
+        r, w_B = rotate(plates.R_NB, satellite.p_BP_B), plates.w_B
+        bias = cross(w_B, cross(w_B, r))  # of dv_P
+        M6 = on_one_body(r, on_one_body(r, M).T)
+        f6 = on_one_body(r, f - dot(M[:, :3], bias))
+        dv_B, dw_B = solve_positive_definite(M6, f6).reshape(2, 3)
+        u_rate = jnp.concatenate([dv_B + cross(dw_B, r) + bias, dw_B, dv_B, dw_B])
     else:
         u_rate = solve_positive_definite(M, f)
     return Accelerations(*u_rate.reshape(4, 3))
@@ -140,6 +142,17 @@ def body_force(
     J = plates.R_NB @ satellite.bus.I_BBcm_B @ plates.R_NB.T
     torque = rotate(J, dw_B) + cross(plates.w_B, rotate(J, plates.w_B))
     return jnp.concatenate([on_plate, -satellite.bus.mass * dv_B, -torque])
+
+
+def on_one_body(r: Float[Array, "3"], forces: Float[Array, "*n 12"]) -> Float[Array, "*n 6"]:
+    """Forces on (v_P, w_P, v_B, w_B) as forces on (v_B, w_B), where both plates are one body.
+
+    Args:
+        r: (3,) from the origin of B to that of P [m].
+        forces: along the last axis.
+    """
+    f_P, t_P, f_B, t_B = jnp.split(forces, 4, axis=-1)
+    return jnp.concatenate([f_P + f_B, t_P + cross(r, f_P) + t_B], axis=-1)
 
 
 def rigid_speeds(satellite: Satellite, plates: PlateMotion) -> Float[Array, "12 6"]:

@@ -17,7 +17,7 @@ from jaxtyping import Array, Float
 from quietbus.dynamics.kinematics import LegMotion, PlateMotion, leg_accelerations
 from quietbus.model.hexapod import Hexapod
 from quietbus.spatial.rotation import skew
-from quietbus.spatial.vector import cross, dot
+from quietbus.spatial.vector import cross, dot, weighted_products
 
 
 class JointFriction(eqx.Module):
@@ -47,32 +47,29 @@ def leg_mass_matrix(legs: Hexapod, motion: LegMotion) -> Float[Array, "12 12"]:
     one = jnp.ones_like(motion.s[:, :1])
     z_U = jnp.concatenate([one, motion.r_U], axis=1)
     z_A = jnp.concatenate([one, motion.r_A], axis=1)
-    weighted = jnp.concatenate([a[:, None] * z_U, b[:, None] * z_A, d[:, None] * z_A], axis=1)
-    moments = jnp.concatenate([z_U, z_A], axis=1).T @ weighted
-    PP, PB, BB = (_joined_points(S) for S in (moments[:4, :4], moments[:4, 4:8], moments[4:, 8:]))
 
     line_U = jnp.concatenate([motion.s, cross(motion.r_U, motion.s)], axis=1)
     line_A = jnp.concatenate([motion.s, cross(motion.r_A, motion.s)], axis=1)
     by_v, by_w = motion.spin_by_velocity, motion.spin_by_bus_rate
-    spin = jnp.concatenate(
-        [by_v, cross(motion.r_U, by_v), -by_v, by_w - cross(motion.r_A, by_v)], axis=1
+    spin_P = jnp.concatenate([by_v, cross(motion.r_U, by_v)], axis=1)
+    spin_B = jnp.concatenate([-by_v, by_w - cross(motion.r_A, by_v)], axis=1)
+
+    PP = (
+        _joined_points(weighted_products(a, z_U, z_U))
+        + weighted_products(m_u - a, line_U, line_U)
+        + weighted_products(I_a, spin_P, spin_P)
     )
-    zero = jnp.zeros_like(line_U)
-    rows = jnp.concatenate(
-        [
-            jnp.concatenate([line_U, zero], axis=1),
-            jnp.concatenate([zero, line_A], axis=1),
-            spin,
-        ]
+    PB = (
+        _joined_points(weighted_products(b, z_U, z_A))
+        - weighted_products(b, line_U, line_A)
+        + weighted_products(I_a, spin_P, spin_B)
     )
-    weighted_rows = jnp.concatenate(
-        [
-            jnp.concatenate([(m_u - a)[:, None] * line_U, -b[:, None] * line_A], axis=1),
-            jnp.concatenate([-b[:, None] * line_U, (m_d - d)[:, None] * line_A], axis=1),
-            I_a[:, None] * spin,
-        ]
+    BB = (
+        _joined_points(weighted_products(d, z_A, z_A))
+        + weighted_products(m_d - d, line_A, line_A)
+        + weighted_products(I_a, spin_B, spin_B)
     )
-    return rows.T @ weighted_rows + jnp.block([[PP, PB], [PB.T, BB]])
+    return jnp.block([[PP, PB], [PB.T, BB]])
 
 
 def leg_forces(

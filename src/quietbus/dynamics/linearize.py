@@ -205,7 +205,7 @@ def linearize(
     states, inputs, outputs = _names(n_cmg, n_leg, tuple(further), wheels)
     torque, command = slice(-3 - n_cmg, -n_cmg), slice(-n_cmg, None)
     if actuator == "servo":
-        steering = _steering(satellite, at)
+        steering = steering_commands(satellite, at.gimbal_angle)
         B[:, torque], D[:, torque] = B[:, command] @ steering, D[:, command] @ steering
     else:
         B[:, command] = D[:, command] = 0.0
@@ -441,9 +441,13 @@ def _derivatives(satellite, at, points):
     return (A, B, C, D), rates
 
 
-def _steering(satellite: Satellite, at: OperatingPoint) -> np.ndarray:
-    """Gimbal rate or rotor torque commands (cmg, 3) by control torque, bus axes."""
-    commands = np.asarray(_steering_matrix(satellite, at.gimbal_angle))
+def steering_commands(satellite: Satellite, gimbal_angle: np.ndarray | Array) -> np.ndarray:
+    """Gimbal rate or rotor torque commands (cmg, 3) by control torque, bus axes.
+
+    Raises:
+        OperatingPointError: steering gives no finite rates at these gimbal angles.
+    """
+    commands = np.asarray(_steering_matrix(satellite, jnp.asarray(gimbal_angle)))
     if not np.all(np.abs(commands) < SINGULAR):
         raise OperatingPointError(
             "the cluster is singular at these gimbal angles, or its rotors stand still: steering "

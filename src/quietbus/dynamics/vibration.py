@@ -37,7 +37,9 @@ from quietbus.dynamics.kinematics import PlateMotion, leg_motion
 from quietbus.dynamics.legs import leg_forces, leg_mass_matrix
 from quietbus.dynamics.state import State
 from quietbus.model.cmg import ORDERS, ClusterMoments
+from quietbus.model.disturbance import on_plate, orders_of
 from quietbus.model.satellite import Satellite
+from quietbus.model.variants import without_disturbance
 from quietbus.spatial.rotation import quaternion_multiply, quaternion_to_matrix, skew
 from quietbus.spatial.vector import cross, dot, rotate, solve_small
 
@@ -77,6 +79,7 @@ def slow_motion(
     satellite: Satellite, t: Float[Array, ""], state: State, averaged: ClusterMoments
 ) -> SlowMotion:
     """The slow motion at time t [s]; ``averaged`` as of ``ClusterMoments.averaged``."""
+    satellite = without_disturbance(satellite)
     signals, a = evaluate(satellite, t, state, jnp.zeros_like(state.gimbal_angle), averaged)
     plates, R_BN = plate_motion(state), quaternion_to_matrix(state.q_NB).T
     vectors = (plates.p_BP, plates.v_B, plates.w_B, plates.v_P, plates.w_P)
@@ -266,7 +269,7 @@ def vibration(
     W = jnp.kron(jnp.eye(4), W)
     C = all_.M @ (W + V) - all_.by_speed
     K = all_.M @ W @ V - all_.by_pose - all_.by_speed @ V
-    control = _control(satellite, slow, moments)
+    control = control_path(satellite, slow, moments)
     if satellite.mount == "isolated":
         return Vibration(slow, all_.M, C, K, control, None)
     T = rigid_speeds(satellite, slow.plates)
@@ -278,13 +281,12 @@ def vibration(
     return Vibration(slow, M, C, K, control, T)
 
 
-def _control(satellite, slow, moments):
+def control_path(satellite: Satellite, slow: SlowMotion, moments: ClusterMoments) -> Control | None:
     """Derivatives of what controller, steering and servo decide, and the gimbals' reaction."""
     if satellite.controller is None or satellite.steering is None:
         return None
+    satellite = without_disturbance(satellite)
     state, n = slow.state, len(slow.gimbal[0])
-
-    wheels = satellite.cluster.wheels
 
     def decide(theta, rate, integral, angle, angle_rate):
         small = jnp.concatenate([jnp.ones(1), 0.5 * theta])
@@ -300,6 +302,21 @@ def _control(satellite, slow, moments):
         signals = control_signals(satellite, slow.t, moved)
         return jnp.concatenate([unit_acceleration(satellite, signals), signals.integral_rate])
 
+    nothing = (jnp.zeros(3), jnp.zeros(3), jnp.zeros(3), jnp.zeros(n), jnp.zeros(n))
+    by = jax.jacfwd(decide, argnums=tuple(range(5)))(*nothing)
+    reaction = gimbal_reaction(slow, moments, satellite.cluster.wheels)
+    return Control(by[0], by[1], by[2], by[3], by[4], reaction)
+
+
+def gimbal_reaction(
+    slow: SlowMotion, moments: ClusterMoments, wheels: bool = False
+) -> Float[Array, "3 12 cmg"]:
+    """Forces on (v_P, w_P, v_B, w_B) by each gimbal's angle, rate and acceleration.
+
+    Args:
+        wheels: by those of each rotor instead.
+    """
+
     def reaction(unit):
         push = jax.vmap(plate_force, (None, 0, None))
         if wheels:
@@ -310,15 +327,15 @@ def _control(satellite, slow, moments):
 
     unit = slow.gimbal
     if wheels:
-        assert state.rotor is not None
-        unit = (state.rotor.angle, slow.rotor_speed, slow.rotor_acceleration)
+        assert slow.state.rotor is not None
+        assert slow.rotor_acceleration is not None
+        unit = (slow.state.rotor.angle, slow.rotor_speed, slow.rotor_acceleration)
 
-    nothing = (jnp.zeros(3), jnp.zeros(3), jnp.zeros(3), jnp.zeros(n), jnp.zeros(n))
     # each unit's reaction is its own: one derivative for all units at once
+    n = len(slow.gimbal[0])
     ways = [tuple(jnp.full(n, float(i == k)) for i in range(3)) for k in range(3)]
     reactions = jnp.stack([jax.jvp(reaction, (unit,), (way,))[1].T for way in ways])
-    by = jax.jacfwd(decide, argnums=tuple(range(5)))(*nothing)
-    return Control(by[0], by[1], by[2], by[3], by[4], jnp.pad(reactions, ((0, 0), (0, 6), (0, 0))))
+    return jnp.pad(reactions, ((0, 0), (0, 6), (0, 0)))
 
 
 def with_units_moved(
@@ -336,15 +353,31 @@ def with_units_moved(
     return eqx.tree_at(where, state, (old_angle + angle, old_rate + angle_rate))
 
 
-def rotor_forces(slow: SlowMotion, moments: ClusterMoments) -> Complex[Array, "order cmg 12"]:
+def rotor_forces(
+    satellite: Satellite, slow: SlowMotion, moments: ClusterMoments
+) -> Complex[Array, "order cmg 12"]:
     """Amplitudes of the forces on (v_P, w_P, v_B, w_B) at each order of each rotor."""
     push, moments = jax.vmap(plate_force, (None, 0, None)), slow.turning(moments)
-    on_plate = [push(slow.plates, moments.order(h, *slow.gimbal), slow.u_rate[:6]) for h in ORDERS]
-    return jnp.pad(jnp.stack(on_plate), ((0, 0), (0, 0), (0, 6)))
+    imbalance = jnp.stack(
+        [push(slow.plates, moments.order(h, *slow.gimbal), slow.u_rate[:6]) for h in ORDERS]
+    )
+    disturbance = satellite.disturbance
+    if disturbance is not None:
+        lines = disturbance.amplitudes(satellite.cluster, slow.rotor_speed)
+        lines = on_bus(slow, on_plate(satellite.cluster, slow.gimbal[0], lines))
+        at = jnp.array(disturbance.imbalance_at)
+        imbalance = jnp.swapaxes(lines, 0, 1).at[at].add(imbalance)
+    return jnp.pad(imbalance, ((0, 0), (0, 0), (0, 6)))
+
+
+def on_bus(slow: SlowMotion, wrench: Complex[Array, "*n 6"]) -> Complex[Array, "*n 6"]:
+    """Forces and torques on the plate, turned from its axes to those of the bus."""
+    vectors = wrench.reshape(*wrench.shape[:-1], 2, 3)
+    return rotate(slow.plates.R_NP, vectors).reshape(wrench.shape)
 
 
 def rotor_response(
-    small: Vibration, moments: ClusterMoments, one_speed: bool = False
+    satellite: Satellite, small: Vibration, moments: ClusterMoments, one_speed: bool = False
 ) -> Complex[Array, "cmg order 12"]:
     """xi of the steady response to each order of each rotor, Re(xi exp(i h phi)).
 
@@ -358,7 +391,8 @@ def rotor_response(
         standing = s == 0.0  # a rotor that stands still shakes nothing
         return jnp.where(standing, 0.0, small.respond(jnp.where(standing, 1j, s), force))
 
-    forces, h = rotor_forces(small.slow, moments), jnp.array(ORDERS)
+    forces = rotor_forces(satellite, small.slow, moments)
+    h = orders_of(satellite.disturbance)
     if one_speed:
         columns = jnp.swapaxes(forces, 1, 2)
         xi = jax.vmap(respond, (0, None, 0))(h, small.slow.rotor_speed[0], columns)
@@ -371,10 +405,12 @@ class View(eqx.Module):
     """What of the bus is looked at, beyond the usual outputs."""
 
     point_B: Float[Array, "point 3"]  # [m] where accelerations are wanted
-    line_of_sight_B: Float[Array, "line 3"]  # [-] unit vectors
+    # [rad per rad, m] image motion by turn and displacement of the bus, and by those of the plate
+    # from its place in the bus
+    line_of_sight: Float[Array, "line 3 12"]
 
 
-NOTHING_SEEN = View(*np.zeros((2, 0, 3)))
+NOTHING_SEEN = View(np.zeros((0, 3)), np.zeros((0, 3, 12)))  # type: ignore[arg-type]
 
 
 def linear_outputs(
@@ -395,6 +431,8 @@ def linear_outputs(
     _, damper = jax.jvp(legs.strut_force, at, (0.0 * one, one))
     turning = s * jnp.eye(3) + small.turning
     point = r_B + cross(theta_B, view.point_B)
+    r_BP = r_P - r_B - cross(theta_B, plates.p_BP)
+    moves_image = jnp.concatenate([theta_B, r_B, theta_P - theta_B, r_BP])
     return {
         "bus_rate": turning @ theta_B,
         "bus_attitude": theta_B,
@@ -402,5 +440,5 @@ def linear_outputs(
         "leg_stroke": stroke,
         "leg_force": (spring + s * damper) * stroke,
         "point_acceleration": rotate(turning @ turning, point),
-        "line_of_sight": cross(theta_B, view.line_of_sight_B),
+        "line_of_sight": view.line_of_sight @ moves_image,
     }

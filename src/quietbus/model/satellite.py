@@ -8,6 +8,8 @@ from jaxtyping import Array, Float
 from quietbus.model.body import Bus, Plate
 from quietbus.model.cmg import ControlMomentGyro
 from quietbus.model.controller import GimbalServo, PIDController
+from quietbus.model.disturbance import Disturbance
+from quietbus.model.gimbal_motor import GimbalMotor
 from quietbus.model.guidance import Guidance
 from quietbus.model.hexapod import Hexapod
 from quietbus.model.load import Load
@@ -29,3 +31,5 @@ class Satellite(eqx.Module):
     steering: Steering | None  # None: gimbals held
     loads: tuple[Load, ...]
     mount: Literal["isolated", "rigid"] = eqx.field(static=True)
+    disturbance: Disturbance | None = None  # of the rotors, beyond their imbalance
+    motor: GimbalMotor | None = None  # None: gimbals move exactly as their servos say

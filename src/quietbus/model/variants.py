@@ -24,6 +24,24 @@ def without_friction(satellite: Satellite) -> Satellite:
     return eqx.tree_at(joints, satellite, tuple(0.0 * value for value in joints(satellite)))
 
 
+def without_disturbance(satellite: Satellite) -> Satellite:
+    """The satellite with no disturbance but the rotors' imbalance, gimbal motors running smoothly.
+
+    The harmonic solver's slow motion is that of this one.
+    """
+    return replace(satellite, disturbance=None, motor=None)
+
+
+def without_noise(satellite: Satellite) -> Satellite:
+    """The satellite without broadband disturbance: with the lines of its rotors alone."""
+    if satellite.disturbance is None:
+        return satellite
+    silent = ((None,) * 4,) * len(satellite.disturbance.broadband)
+    return replace(
+        satellite, disturbance=replace(satellite.disturbance, broadband=silent, noise=None)
+    )
+
+
 def without_rotation(satellite: Satellite) -> Satellite:
     """The satellite with its rotors at a standstill, which they keep."""
     cluster = satellite.cluster

@@ -3,14 +3,18 @@
 from quietbus.plots.analysis import analysis_figures
 from quietbus.plots.compare import compare_figures, envelope_comparison
 from quietbus.plots.jitter import jitter_figures
+from quietbus.plots.pointing import pointing_figures
 from quietbus.plots.run import run_figures
 from quietbus.plots.style import save_figures
+from quietbus.plots.sweep import sweep_figures
 
 __all__ = [
     "analysis_figures",
     "compare_figures",
     "envelope_comparison",
     "jitter_figures",
+    "pointing_figures",
     "run_figures",
     "save_figures",
+    "sweep_figures",
 ]

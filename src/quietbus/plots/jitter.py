@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import textwrap
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from quietbus.analysis.jitter import KINDS
 from quietbus.jitter_study import jitter_of_designs, worst_case_norm
 from quietbus.model.cmg import ORDERS
 from quietbus.plots.signals import AXES, LINES, NOISE, RotorLines
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
 NO_JITTER = f"no jitter: the rotors shake the bus by less than {NOISE:g} deg/s"
 ROUNDING = 1e-9  # of the largest line: lines that are left out
 MINOR = 1e-6  # of all amplitudes together: parts of a budget that are left out
-HATCHES = ("", "////", "....", "xxxx")  # of the orders in a budget
+HATCHES = ("", "////")  # of the orders of imbalance in a budget
 CROWDED = 12  # names side by side; more are turned
 
 
@@ -35,6 +34,8 @@ def jitter_figures(study: JitterStudy) -> dict[str, Figure]:
         figures = {"spectrum": spectrum(study), "budget": budget(study)}
         if not study.wheels:
             figures["worst"] = worst(study)
+        if study.noise("isolated") is not None:
+            figures["noise"] = noise(study)
         return figures
 
 
@@ -45,8 +46,8 @@ def spectrum(study: JitterStudy) -> Figure:
         mount: RotorLines(
             np.rad2deg(1.0) * study.bus_rate(mount),
             study.frequency,
-            np.outer(study.satellite(mount).cluster.rotor_phase, ORDERS),
-            ORDERS,
+            np.outer(study.satellite(mount).cluster.rotor_phase, study.orders),
+            study.orders,
         )
         for mount in LINES
     }
@@ -138,14 +139,21 @@ def log_scale(axes: Axes, low: float, high: float) -> None:
 def budget(study: JitterStudy) -> Figure:
     """The bus rate's amplitudes by rotor and kind of imbalance, stacked, on both mounts."""
     figure = new_figure(6.2, f"Bus rate by rotor and kind of imbalance ({study.scenario.name})")
-    parts = {  # (kind, order, cmg, axis)
-        mount: np.rad2deg(np.abs(study.budget[mount])).swapaxes(1, 2) for mount in LINES
+    stack = _budget_parts(study)
+    parts = {  # (part, cmg, axis)
+        mount: np.stack(
+            [
+                np.rad2deg(np.abs(study.budget[mount][part.kind][:, part.at])).sum(axis=1)
+                for part in stack
+            ]
+        )
+        for mount in LINES
     }
     if max(float(values.max(initial=0.0)) for values in parts.values()) < NOISE:
         explain(figure.subplots(), NO_JITTER)
         return figure
-    share = np.max([v.sum(axis=(2, 3)) / (v.sum() or 1.0) for v in parts.values()], axis=0)
-    shown = share >= MINOR  # (kind, order)
+    share = np.max([v.sum(axis=(1, 2)) / (v.sum() or 1.0) for v in parts.values()], axis=0)
+    shown = share >= MINOR  # (part,)
     panels = figure.subplots(3, 2, sharex=True, sharey="col")
     rotors = np.arange(len(study.gimbal_angle))
     sums = {mount: np.rad2deg(study.combined(mount).worst_case) for mount in LINES}
@@ -156,18 +164,18 @@ def budget(study: JitterStudy) -> Figure:
         panels[0, column].set_title(title)
         for i, axes in enumerate(panels[:, column]):
             bottom = np.zeros(len(rotors))
-            for kind, order in np.argwhere(shown):
-                height = factor * parts[mount][kind, order, :, i]
+            for k in np.flatnonzero(shown):
+                height = factor * parts[mount][k, :, i]
                 axes.bar(
                     rotors,
                     height,
                     0.6,
                     bottom,
-                    color=COLOURS[kind],
+                    color=COLOURS[stack[k].kind],
                     edgecolor="white",
                     linewidth=0.0,
-                    hatch=HATCHES[order],
-                    label=f"{KINDS[kind]}, {ORDERS[order]}Ω",
+                    hatch=stack[k].hatch,
+                    label=f"{stack[k].name}, {stack[k].order}",
                 )
                 bottom += height
             label = "each rotor, phases as given"
@@ -194,25 +202,64 @@ def budget(study: JitterStudy) -> Figure:
         *panels[0, 0].get_legend_handles_labels(),
         loc="outside lower left",
         ncols=3,
-        title=_budget_caption(shown),
+        title=_budget_caption(stack, shown),
         title_fontsize=8,
         alignment="left",
     )
     return figure
 
 
-def _budget_caption(shown: np.ndarray) -> str:
-    """What the stacks mean, and which kinds (kind, order) are left out."""
+def noise(study: JitterStudy) -> Figure:
+    """Spectral density of the bus rate by the rotors' broadband disturbance, on both mounts."""
+    figure = new_figure(5.6, f"Bus rate by broadband disturbance ({study.scenario.name})")
+    panels = figure.subplots(3, 1, sharex=True, sharey=True)
+    for mount, (label, look) in LINES.items():
+        spectra = study.noise(mount)
+        assert spectra is not None
+        density = np.rad2deg(np.sqrt(spectra.psd["bus_rate"][0].sum(axis=1)))
+        rms = np.rad2deg(np.sqrt(spectra.variance("bus_rate", 1)[0]))
+        for i, axes in enumerate(panels):
+            said = f"{label}, RMS {rms[i]:.3g} deg/s"
+            axes.loglog(spectra.frequency, density[:, i], **{**look, "label": said})
+            axes.set_ylabel(f"about {AXES[i]}\n[deg/s/√Hz]")
+            axes.legend(loc="best")
+    panels[-1].set_xlabel("frequency [Hz]")
+    return figure
+
+
+class _Part(NamedTuple):
+    """One part of a stack."""
+
+    kind: int  # among those of the study
+    name: str  # of the kind
+    order: str
+    at: list[int]  # positions of its orders
+    hatch: str
+
+
+def _budget_parts(study: JitterStudy) -> list[_Part]:
+    """Imbalance has two orders, told apart by hatches; those of tables are taken together."""
+    parts = []
+    for kind, name in enumerate(study.kinds):
+        if name == "order tables":
+            parts.append(_Part(kind, name, "all orders", list(range(len(study.orders))), ""))
+            continue
+        for order, hatch in zip(ORDERS, HATCHES, strict=True):
+            parts.append(_Part(kind, name, f"{order}Ω", [study.orders.index(order)], hatch))
+    return parts
+
+
+def _budget_caption(parts: Sequence[_Part], shown: np.ndarray) -> str:
+    """What the stacks mean, and which parts are left out."""
     text = (
         "Stacked: the amplitudes of the kinds; they reach the top only if all are in phase, the "
         "worst case. Diamonds: the rotor's amplitude, its kinds added with their phases."
     )
-    missing = []
-    for kind, orders in zip(KINDS, shown, strict=True):
-        if not orders.any():
-            missing.append(kind)
-        else:
-            missing += [f"{kind} at {ORDERS[k]}Ω" for k in np.flatnonzero(~orders)]
+    drawn = {part.name for part, there in zip(parts, shown, strict=True) if there}
+    gone = [part for part, there in zip(parts, shown, strict=True) if not there]
+    missing = dict.fromkeys(
+        f"{part.name} at {part.order}" if part.name in drawn else part.name for part in gone
+    )
     if missing:
         text += f" Left out, less than {_power(MINOR)} of the total: {', '.join(missing)}."
     return textwrap.fill(text, 125)

@@ -127,7 +127,7 @@ class RotorLines:
     amplitude: np.ndarray  # (cmg, order, axis) [deg/s] complex, as ``combine`` takes it
     frequency: np.ndarray  # (cmg, order) [rad/s], of either sign
     phase: np.ndarray  # (cmg, order) [rad] at t = 0
-    orders: tuple[int, ...]
+    orders: tuple[float, ...]
 
     def by_frequency(self) -> list[list[tuple[int, int]]]:
         """Lines (cmg, order) of each frequency, from the lowest to the highest."""
@@ -153,7 +153,7 @@ class RotorLines:
         """``1Ω, 100 Hz`` for lines of one frequency."""
         orders = sorted({self.orders[k] for _, k in group})
         hz = abs(self.frequency[group[0]]) / (2.0 * np.pi)
-        return f"{', '.join(f'{order}Ω' for order in orders)}, {hz:.5g} Hz"
+        return f"{', '.join(f'{order:g}Ω' for order in orders)}, {hz:.5g} Hz"
 
 
 def last_lines(run: xr.Dataset) -> RotorLines:

@@ -3,6 +3,7 @@
 import hashlib
 import importlib.metadata
 import json
+import math
 import os
 import pathlib
 import traceback
@@ -101,14 +102,21 @@ class Workshop:
         return made if whole and made.key == self.key else None
 
     def keep(self, part: Part, found: Findings) -> Made:
-        """Write a part's picture and numbers, each whole or not at all."""
+        """Write a part's picture and numbers, each whole or not at all.
+
+        Raises:
+            ValueError: a number is not finite, which has no place in JSON.
+        """
+        numbers = {name: float(value) for name, value in found.numbers.items()}
+        odd = [name for name, value in numbers.items() if not math.isfinite(value)]
+        if odd:
+            raise ValueError(f"expected finite numbers, got others for {', '.join(odd)}")
         file = f"{part.name}.png"
         unfinished = self.store / f"{file}.part"
         with style():
             found.figure.savefig(unfinished, format="png")
         picture = unfinished.read_bytes()
         unfinished.replace(self.folder / file)
-        numbers = {name: float(value) for name, value in found.numbers.items()}
         made = Made(self.key, file, _hash(picture), found.caption, found.text, numbers)
         self.write(self.store / f"{part.name}.json", json.dumps(asdict(made), indent=1))
         return made

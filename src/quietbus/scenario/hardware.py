@@ -38,6 +38,7 @@ from quietbus.scenario.base import (
     listing,
 )
 from quietbus.scenario.checks import free_directions, inertia_defect, listed
+from quietbus.scenario.disturbance import Disturbance, GimbalMotor
 from quietbus.scenario.errors import Findings
 from quietbus.scenario.run_up import RunUp
 
@@ -206,6 +207,7 @@ class Rotor(Part):
     dynamic_imbalance_phase: Angle = 0.0  # in the rotor plane, from the static imbalance
     installation_error: InstallationError = InstallationError()
     offset: Vector[Length] = ZERO  # gimbal mass centre to rotor centre; gimbal axes (s, t, g)
+    disturbance: Disturbance | None = None  # beyond the imbalance
 
     @property
     def inertia(self) -> np.ndarray:
@@ -312,6 +314,25 @@ class Placed(Part):
     run_up: RunUp | None = None  # None: speeds as the rotors have them
 
     @property
+    def orders(self) -> tuple[float, ...]:
+        """Multiples of rotor speed in the run: those of imbalance, 1 and 2, and of all tables."""
+        rotors = (unit.rotor for unit in self.placed() if unit.rotor)
+        tables = (rotor.disturbance.orders for rotor in rotors if rotor.disturbance)
+        found = {line.order for table in tables for line in table or ()} | {1.0, 2.0}
+        whole = all(order.is_integer() for order in found)
+        return tuple(sorted(int(order) if whole else order for order in found))
+
+    @property
+    def seeds(self) -> tuple[int, ...]:
+        """Of the rotors' random phases and noise."""
+        rotors = (unit.rotor for unit in self.placed())
+        return tuple(r.disturbance.seed if r and r.disturbance else 0 for r in rotors)
+
+    def placed(self) -> tuple[Any, ...]:
+        """All units, each with its parts."""
+        raise NotImplementedError
+
+    @property
     def count(self) -> int:
         """Number of units."""
         return self.pyramid.units if self.pyramid else len(getattr(self, "units", None) or ())
@@ -395,6 +416,7 @@ class Cluster(Placed):
     gimbal_bandwidth: PositiveAngularVelocity  # of the first-order rate servo
     gimbal_rate_limit: PositiveAngularVelocity | None = None
     gimbal_acceleration_limit: PositiveAngularAcceleration | None = None
+    gimbal_motor: GimbalMotor | None = None  # None: turns the gimbal exactly as its servo says
 
     def placed(self) -> tuple[Unit, ...]:
         """All CMGs as units, each with its gimbal body and rotor."""

@@ -47,7 +47,7 @@ def load_scenario(path_or_name: str | os.PathLike[str]) -> Scenario:
     except (OSError, ValueError) as error:  # ValueError: a null character in the name
         why = getattr(error, "strerror", None) or str(error)
         raise ScenarioError(source, [Problem(f"cannot be read: {why}")]) from None
-    return Scenario.from_yaml(text, source)
+    return Scenario.from_yaml(text, source, str(pathlib.Path(source).parent))
 
 
 def _not_found(source: str) -> str:

@@ -9,13 +9,14 @@ from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import BeforeValidator, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from quietbus.scenario.base import Duration, Frequency, Part, PositiveNumber, Text, listing
 from quietbus.scenario.checks import listed
 from quietbus.scenario.control import Control, Initial, Load, NoSteering, PseudoInverse, Target
 from quietbus.scenario.errors import Findings, Path, Problem, ScenarioError, dotted, found
 from quietbus.scenario.hardware import Bus, Cluster, Isolator
+from quietbus.scenario.pointing import LinesOfSight, Requirements, unknown_lines
 from quietbus.scenario.text import read_yaml, write_yaml
 from quietbus.scenario.units import expected
 from quietbus.scenario.wheels import AnyCluster, WheelCluster, cluster_type
@@ -102,7 +103,17 @@ class Scenario(Part):
     initial: Initial = Initial()
     target: Target = Target()
     loads: Annotated[tuple[Load, ...], listing(None, "loads", least=0)] = ()
+    lines_of_sight: LinesOfSight = Field(default={})
+    requirements: Requirements = ()
     simulation: Simulation = Simulation()
+
+    def __hash__(self) -> int:
+        return hash(json.dumps(self.to_dict(), sort_keys=True))
+
+    @model_validator(mode="after")
+    def _check_requirements(self) -> Self:
+        unknown_lines(self.requirements, self.lines_of_sight).raise_any()
+        return self
 
     @model_validator(mode="before")
     @classmethod
@@ -131,10 +142,13 @@ class Scenario(Part):
         return self
 
     @classmethod
-    def from_yaml(cls, text: str, source: str = "<text>") -> Self:
-        """Scenario from YAML text; ScenarioError lists all problems, with lines of ``source``."""
+    def from_yaml(cls, text: str, source: str = "<text>", folder: str = ".") -> Self:
+        """Scenario from YAML text; ScenarioError lists all problems, with lines of ``source``.
+
+        Files that it names are looked for in ``folder``.
+        """
         data, line_of = read_yaml(text, source)
-        return cls._checked(data, source, line_of)
+        return cls._checked(data, source, line_of, folder)
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], source: str = "<data>") -> Self:
@@ -143,10 +157,14 @@ class Scenario(Part):
 
     @classmethod
     def _checked(
-        cls, data: Any, source: str, line_of: Callable[[Path], int | None] | None = None
+        cls,
+        data: Any,
+        source: str,
+        line_of: Callable[[Path], int | None] | None = None,
+        folder: str = ".",
     ) -> Self:
         try:
-            return cls.model_validate(data)
+            return cls.model_validate(data, context={"folder": folder})
         except ValidationError as error:
             raise ScenarioError(source, found(error, line_of)) from None
 

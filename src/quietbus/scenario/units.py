@@ -144,6 +144,7 @@ class Quantity:
         unit: SI unit; empty for a plain number.
         above: exclusive lower bound, if any.
         least: inclusive lower bound, if any.
+        exact: radians count: per Hz is not per rad/s.
 
     Angles, their rates and frequencies must have exactly the angle power of ``unit``; elsewhere
     radians are ignored, so that N*m*s and N*m*s/rad are the same.
@@ -153,6 +154,7 @@ class Quantity:
     unit: str
     above: float | None = None
     least: float | None = None
+    exact: bool = False
 
     def __get_pydantic_core_schema__(self, _: Any, __: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self.read)
@@ -193,9 +195,8 @@ class Quantity:
         angular = "[angle]" in expected and set(expected) <= {"[angle]", "[time]"}
         if powers == expected:
             return number * factor
-        if not (angular or self.unit == "Hz") and _without_angle(powers) == _without_angle(
-            expected
-        ):
+        strict = angular or self.exact or self.unit in ("", "Hz")
+        if not strict and _without_angle(powers) == _without_angle(expected):
             return number * factor
         raise self._error(text, self._guess(expected, powers))
 
@@ -206,7 +207,7 @@ class Quantity:
             units = "rpm, rev/s, deg/s or rad/s" if self.unit == "rad/s" else self.unit
             return f"turns or radians? write {units}"
         if self.unit == "Hz" and _without_angle(powers) == expected:
-            return "an angular velocity? samples are counted in Hz"
+            return "an angular velocity? frequencies are in Hz"
         return f"{names[0]}?" if names else "another dimension"
 
     def _error(self, value: Any, why: str = "") -> PydanticCustomError:

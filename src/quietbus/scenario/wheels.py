@@ -71,6 +71,11 @@ class WheelCluster(Placed):
         """None: wheels have no gimbals."""
         return
 
+    @property
+    def gimbal_motor(self) -> None:
+        """None, likewise."""
+        return
+
     def placed(self) -> tuple[Wheel, ...]:
         """All wheels as units, each with its housing, rotor and motor."""
         if self.pyramid is None:

@@ -21,6 +21,7 @@ from quietbus.dynamics.outputs import Outputs, geometry_margin, outputs
 from quietbus.dynamics.state import State
 from quietbus.model.cmg import ClusterMoments
 from quietbus.model.satellite import Satellite
+from quietbus.model.variants import without_disturbance
 from quietbus.spatial.rotation import quaternion_normalize
 
 STEPS_PER_CALL = 4096  # at the most, so that a stiff run too can be watched and stopped
@@ -151,7 +152,7 @@ def _compiled_piece(satellite, state, numbers, scheme) -> _Piece:
     t0, t1, step, ts, rtol, atol = numbers
     moments = ClusterMoments.expand(satellite.cluster)
     if scheme.averaged:
-        moments = moments.averaged()
+        moments, satellite = moments.averaged(), without_disturbance(satellite)
     y0, unravel = ravel_pytree(state)
 
     @jax.jit  # traced once for the integrator's many uses of it

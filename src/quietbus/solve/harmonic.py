@@ -19,6 +19,7 @@ from jax.flatten_util import ravel_pytree
 from scipy.spatial.transform import Rotation
 
 from quietbus.dynamics.closed_loop import evaluate, rotor_angles
+from quietbus.dynamics.disturbance_response import ripple_lines
 from quietbus.dynamics.state import State
 from quietbus.dynamics.vibration import (
     NOTHING_SEEN,
@@ -33,9 +34,12 @@ from quietbus.dynamics.vibration import (
     vibration,
     with_units_moved,
 )
-from quietbus.model.cmg import ORDERS, ClusterMoments
+from quietbus.model.cmg import ClusterMoments
+from quietbus.model.disturbance import orders_of
 from quietbus.model.satellite import Satellite
+from quietbus.model.variants import without_disturbance, without_noise
 from quietbus.solve.direct import SLOW, Solution, Tolerances, integrate
+from quietbus.solve.noise import Broadband, noise_spectra
 from quietbus.spatial.rotation import (
     quaternion_multiply,
     quaternion_to_matrix,
@@ -67,6 +71,9 @@ class Jitter:
     amplitudes: dict[str, np.ndarray]  # (n, cmg, order, ...) by output, complex
     change_error: np.ndarray  # (n,) estimated relative error of the assumption of slow change
     warnings: tuple[str, ...]
+    # by gimbal motors, (n, cmg, line, ...); the phase is against line times gimbal angle
+    ripple: dict[str, np.ndarray] | None = None
+    broadband: Broadband | None = None
 
 
 @dataclass(frozen=True)
@@ -143,23 +150,38 @@ def on_periodic_solution(satellite: Satellite, state: State) -> State:
     """
     small, xi = _jitter_at(satellite, state)
     speed, phase = _rotors(satellite, state)
-    first = _motions(small, xi, phase)
+    first = _motions(satellite, small, xi, phase)
     second = [np.zeros_like(part) for part in first]
     speeds = np.abs(np.asarray(speed))
+    orders = np.asarray(orders_of(satellite.disturbance))
     for one in np.unique(speeds[speeds > 0.0]):
-        square = _jitter_squared(satellite, state, small, xi, speeds == one)
-        for part, moved in zip(second, _answer_to_square(small, square, one), strict=True):
-            part += moved
+        for base, together in _periods(orders):
+            turns = max(TURNS, 4 * round(np.max(orders[together]) / base) + 4)
+            chosen = (speeds == one)[:, None] & together
+            square = _jitter_squared(satellite, state, small, xi, chosen, jnp.asarray(base), turns)
+            moved = _answer_to_square(small, square, base * one)
+            for part, more in zip(second, moved, strict=True):
+                part += more
     return _displaced(satellite, state, *map(np.add, first, second))
+
+
+def _periods(orders: np.ndarray) -> list[tuple[float, np.ndarray]]:
+    """Orders that have a common period, by that of the group: the whole ones, each of the others.
+
+    Products of lines of different groups have no mean and are left out.
+    """
+    whole = orders == np.round(orders)
+    return [(1.0, whole), *((float(h), orders == h) for h in orders[~whole])]
 
 
 def _answer_to_square(small: Vibration, square: Sequence[np.ndarray], speed: float):
     """Motion at t = 0, as of ``_motions``, that the jitter's square causes at multiples of speed.
 
     Args:
-        square: over ``TURNS`` angles, accelerations (12,), gimbals' and rate of the integral.
+        square: over a turn's angles, accelerations (12,), gimbals' and rate of the integral.
     """
-    u_rate, gimbal, integral = (np.fft.rfft(part, axis=0) / TURNS for part in square)
+    turns = len(square[0])
+    u_rate, gimbal, integral = (np.fft.rfft(part, axis=0) / turns for part in square)
     T, n, gimbals = small.projection, len(small.M), gimbal.shape[1]
     pushed = u_rate if T is None else u_rate[:, 6:]  # a rigid mount's follow those of the bus
     memory = np.concatenate([0.0 * gimbal, gimbal, integral], axis=1)
@@ -170,7 +192,7 @@ def _answer_to_square(small: Vibration, square: Sequence[np.ndarray], speed: flo
     turning = np.asarray(small.turning)
     pose, pose_rate = np.zeros(12), np.zeros(12)
     moved = np.zeros(memory.shape[1])
-    for m in range(TURNS // 2):
+    for m in range(turns // 2):
         b = np.concatenate([np.zeros(n), pushed[m], memory[m]])
         if m == 0:  # A is singular where nothing holds the satellite
             x = np.linalg.lstsq(A, -b.real, rcond=1e-13)[0]
@@ -185,6 +207,15 @@ def _answer_to_square(small: Vibration, square: Sequence[np.ndarray], speed: flo
     return pose, pose_rate, *np.split(moved, [gimbals, 2 * gimbals])
 
 
+def steady_speeds(satellite: Satellite, state: State) -> np.ndarray:
+    """Amplitudes (cmg, order, 6) of the bus's velocity [m/s] and rate [rad/s] at t = 0."""
+    states = jax.tree.map(lambda leaf: np.asarray(leaf)[None], state)
+    _, xi, _ = _Along(satellite, np.zeros(1), states).chunk(np.zeros(1, int), NOTHING_SEEN)
+    orders = np.asarray(orders_of(satellite.disturbance))
+    speed = np.abs(np.outer(np.asarray(satellite.cluster.rotor_speed), orders))
+    return speed[..., None] * np.abs(xi[0, ..., 6:])
+
+
 def without_jitter(satellite: Satellite, state: State) -> State:
     """The slow motion's state at t = 0, from the true one."""
     small, xi = _jitter_at(satellite, state)
@@ -193,7 +224,7 @@ def without_jitter(satellite: Satellite, state: State) -> State:
 
 @eqx.filter_jit
 def _moved_by(satellite, state, small, xi):
-    motions = _motions(small, xi, _rotors(satellite, state)[1])
+    motions = _motions(satellite, small, xi, _rotors(satellite, state)[1])
     return _displaced(satellite, state, *motions)
 
 
@@ -208,12 +239,12 @@ def _jitter_at(satellite: Satellite, state: State) -> tuple[Vibration, np.ndarra
     _, xi, small = _Along(satellite, np.zeros(1), states).chunk(np.zeros(1, int), NOTHING_SEEN)
     small = jax.tree.map(lambda leaf: leaf[0], small)
     modes = np.linalg.eigvals(small.state_matrix())
-    refuse_resonance(np.asarray(small.slow.rotor_speed), "at t = 0 s", modes)
+    refuse_resonance(satellite, "at t = 0 s", modes, np.asarray(small.slow.rotor_speed))
     return small, xi[0]
 
 
 @eqx.filter_jit
-def _motions(small, xi, phase):
+def _motions(satellite, small, xi, phase):
     """Pose, its rate, gimbal angles, their rates and integral of jitter xi at rotor angles."""
     n = len(phase)
 
@@ -227,52 +258,71 @@ def _motions(small, xi, phase):
 
     over_orders = jax.vmap(one, (0, None, None, 0))
     moved = jax.vmap(over_orders, (None, 0, 0, 0))(
-        jnp.array(ORDERS), small.slow.rotor_speed, phase, xi
+        orders_of(satellite.disturbance), small.slow.rotor_speed, phase, xi
     )
     return tuple(jnp.sum(part.real, axis=(0, 1)) for part in moved)
 
 
 @eqx.filter_jit
-def _jitter_squared(satellite, state, small, xi, same):
-    """What rates have beyond first order in the jitter of some rotors, at ``TURNS`` angles.
+def _jitter_squared(satellite, state, small, xi, chosen, base, turns):
+    """What rates have beyond first order in some lines, at equally spaced angles of a turn.
 
-    Lines of different frequency have no steady product, so that rotors of each speed (``same``)
-    are taken by themselves. Accelerations (12,) are along bus axes.
+    Lines without a common period have no steady product, so that rotors of each speed, and groups
+    of their orders, are taken by themselves. Accelerations (12,) are along bus axes.
+
+    Args:
+        chosen: (cmg, order) which lines.
+        base: the order whose turn it is.
+        turns: number of angles.
     """
+    quiet, orders = without_disturbance(satellite), orders_of(satellite.disturbance)
+    disturbance = satellite.disturbance
+    first = 0 if disturbance is None else disturbance.imbalance_at[0]
+    same = chosen[:, first]  # order 2 is in the group of order 1
+    satellite = _with_lines(quiet, disturbance, chosen)
     moments = ClusterMoments.expand(satellite.cluster)
     averaged = moments.averaged()
     speed, phase = _rotors(satellite, state)
     R_BN = quaternion_to_matrix(state.q_NB).T
-    chosen = lambda all_: all_.at[..., 1:].multiply(same[:, None, None])  # noqa: E731
+    some = lambda all_: all_.at[..., 1:].multiply(same[:, None, None])  # noqa: E731
     kinds = lambda m: (m.c_H, m.J, m.H_gimbal)  # noqa: E731
-    shaking = eqx.tree_at(kinds, moments, tuple(map(chosen, kinds(moments))))
-    xi = jnp.where(same[:, None, None], xi, 0.0)
-    s = 1j * speed[:, None] * jnp.array(ORDERS)
+    shaking = eqx.tree_at(kinds, moments, tuple(map(some, kinds(moments))))
+    xi = jnp.where(chosen[..., None], xi, 0.0)
+    s = 1j * speed[:, None] * orders
     spin = jax.vmap(jax.vmap(lambda s: s * jnp.eye(3) + small.turning))(s)
     xi_rate = jnp.einsum("joab,jocb->joca", spin, xi.reshape(*xi.shape[:2], 4, 3))
     xi_second = jnp.einsum("joab,jocb->joca", spin, xi_rate).reshape(xi.shape)
 
-    def rates(state, phi, moments):
+    def rates(satellite, state, phi, moments):
         signals, a = evaluate(satellite, jnp.zeros(()), state, phi, moments)
         u_rate = jnp.stack([a.v_P, a.w_P, a.v_B, a.w_B]) @ R_BN.T
         return u_rate.reshape(12), unit_acceleration(satellite, signals), signals.integral_rate
 
     def beyond(turn):
-        phi = phase + turn * jnp.sign(speed)
-        now = _motions(small, xi, phi)
-        true = rates(_displaced(satellite, state, *now), phi, shaking)
-        still = rates(state, phi, averaged)
+        phi = phase + turn / base * jnp.sign(speed)
+        now = _motions(satellite, small, xi, phi)
+        true = rates(satellite, _displaced(satellite, state, *now), phi, shaking)
+        still = rates(quiet, state, phi, averaged)
         # first order: time derivatives of the motion
-        turned = jnp.exp(1j * phi[:, None] * jnp.array(ORDERS))[..., None]
+        turned = jnp.exp(1j * phi[:, None] * orders)[..., None]
         accelerations = jnp.sum((xi_second * turned).real, axis=(0, 1))
-        changing = _motions(small, xi * s[..., None], phi)
+        changing = _motions(satellite, small, xi * s[..., None], phi)
         known = (accelerations, changing[3], changing[4])
         return tuple(t - still_ - k for t, still_, k in zip(true, still, known, strict=True))
 
-    return jax.vmap(beyond)(2.0 * jnp.pi / TURNS * jnp.arange(TURNS))
+    return jax.vmap(beyond)(2.0 * jnp.pi / turns * jnp.arange(turns))
 
 
-TURNS = 16  # angles over which products of orders up to 2 are averaged
+TURNS = 16  # angles at least over which products of orders, up to 2 here, are averaged
+
+
+def _with_lines(quiet, disturbance, chosen):
+    """The satellite with some lines of its rotors' disturbance only, without noise."""
+    if disturbance is None:
+        return quiet
+    coefficient = jnp.where(chosen[..., None], disturbance.coefficient, 0.0)
+    lines = replace(disturbance, coefficient=coefficient)
+    return without_noise(replace(quiet, disturbance=lines))
 
 
 def _displaced(
@@ -320,6 +370,8 @@ def respond(
     """
     along = _Along(satellite, time, states)
     amplitudes: dict[str, np.ndarray] = {}
+    ripple: list[dict[str, np.ndarray]] = []
+    looked: dict[int, Vibration] = {}
     looks = np.unique(np.linspace(0, len(time) - 1, LOOKS).astype(int))
     speeds = np.asarray(rotor_speeds(satellite, states))
     speeds = np.broadcast_to(speeds, (len(time), speeds.shape[-1]))
@@ -335,6 +387,10 @@ def respond(
                 )
                 whole[these] = value
             modes |= _eigenvalues(small, start, np.intersect1d(looks, these))
+            if satellite.motor is not None:
+                ripple.append(jax.tree.map(np.asarray, ripple_lines(satellite, small, view)))
+            for look in np.intersect1d(looks, these):
+                looked[int(look)] = _instant(small, int(look) - start)
             done = int(these[-1]) + 1
             if progress is not None:
                 progress(float(time[done - 1]))
@@ -342,10 +398,15 @@ def respond(
         if not done:
             raise
     amplitudes = {name: value[:done] for name, value in amplitudes.items()}
+    ripples = None
+    if ripple:
+        ripples = {name: np.concatenate([part[name] for part in ripple]) for name in ripple[0]}
     for look, eigenvalues in modes.items():
-        refuse_resonance(speeds[look], f"at t = {time[look]:g} s", eigenvalues)
+        refuse_resonance(satellite, f"at t = {time[look]:g} s", eigenvalues, speeds[look])
     states = jax.tree.map(lambda leaf: np.asarray(leaf)[:done], states)
-    error = _change_error(time[:done], amplitudes["bus_rate"], states, speeds[:done], modes)
+    error = _change_error(
+        satellite, time[:done], amplitudes["bus_rate"], states, speeds[:done], modes
+    )
     said = []
     if error.size and np.max(error) > SLOW_CHANGE:
         worst = int(np.argmax(error))
@@ -358,7 +419,32 @@ def respond(
     growing = _growing(last, 1.0 / max(float(time[-1]), 1e-9))
     if growing:
         said.append(f"the slow motion is unstable: {growing}")
-    return Jitter(amplitudes, error, tuple(said)), done
+    if satellite.motor is not None:
+        index = satellite.motor.modulation(
+            satellite.cluster, jnp.asarray(states.gimbal_rate)[:done], satellite.servo.bandwidth
+        )
+        if np.max(index) > SLOW_CHANGE:
+            said.append(
+                f"the gimbal motors' ripple turns the gimbals by up to {np.max(index):.2g} rad of "
+                "its own phase: the jitter that it causes may be wrong by as much (above "
+                f"{SLOW_CHANGE:g} rad use method 'direct')"
+            )
+    noise = _broadband(satellite, looked, modes, view)
+    return Jitter(amplitudes, error, tuple(said), ripples, noise), done
+
+
+def _broadband(satellite, looked, modes, view) -> Broadband | None:
+    """Spectra of the response to noise at the looks, if there is noise."""
+    if satellite.disturbance is None or not satellite.disturbance.noisy:
+        return None
+    instants = np.array(sorted(looked))
+    small = jax.tree.map(lambda *each: np.stack(each), *(looked[k] for k in instants.tolist()))
+    eigenvalues = np.concatenate([modes[k] for k in instants.tolist()])
+    return Broadband(instants, *noise_spectra(satellite, small, eigenvalues, view))
+
+
+def _instant(small: Vibration, k: int) -> Vibration:
+    return jax.tree.map(lambda leaf: leaf[k], small)
 
 
 Chunk = tuple[dict[str, np.ndarray], np.ndarray, Vibration]
@@ -475,8 +561,8 @@ def _compiled_chunk(satellite, t, states, legs, view, one_speed):
         example = jax.eval_shape(lambda: leg_coefficients(satellite, slow))
         _, unravel = ravel_pytree(jax.tree.map(lambda leaf: jnp.zeros(leaf.shape), example))
         small = vibration(satellite, slow, moments, unravel(row))
-        xi = rotor_response(small, moments, one_speed)
-        s = 1j * slow.rotor_speed[:, None] * jnp.array(ORDERS)
+        xi = rotor_response(satellite, small, moments, one_speed)
+        s = 1j * slow.rotor_speed[:, None] * orders_of(satellite.disturbance)
         views = jax.vmap(jax.vmap(lambda s, x: linear_outputs(satellite, small, s, x, view)))
         return views(s, xi), xi, small
 
@@ -487,31 +573,33 @@ def _eigenvalues(small: Vibration, start: int, looks: np.ndarray) -> dict[int, n
     """Eigenvalues [rad/s] of the controlled satellite at instants of a chunk."""
     if not looks.size:
         return {}
-    at = lambda look: jax.tree.map(lambda leaf: leaf[look - start], small)  # noqa: E731
-    matrices = np.stack([at(look).state_matrix() for look in looks])
+    matrices = np.stack([_instant(small, look - start).state_matrix() for look in looks])
     return dict(zip(looks.tolist(), np.linalg.eigvals(matrices), strict=True))
 
 
-def refuse_resonance(speeds: np.ndarray, where: str, eigenvalues: np.ndarray) -> None:
+def refuse_resonance(
+    satellite: Satellite, where: str, eigenvalues: np.ndarray, speeds: np.ndarray | None = None
+) -> None:
     """Raise ResonanceError if an order of a rotor lies on an undamped mode.
 
     Args:
-        speeds: of the rotors [rad/s].
         where: which operating point, for the message.
         eigenvalues: of the controlled satellite [rad/s].
+        speeds: (cmg,) of the rotors [rad/s], instead of the nominal ones.
     """
-    for j, speed in enumerate(np.asarray(speeds)):
-        for h in ORDERS:
+    given = satellite.cluster.rotor_speed if speeds is None else speeds
+    for j, speed in enumerate(np.asarray(given)):
+        for h in np.asarray(orders_of(satellite.disturbance)):
             distance = np.min(np.abs(1j * h * speed - eigenvalues))
             if speed != 0.0 and distance < ON_A_MODE * abs(h * speed):
                 raise ResonanceError(
-                    f"order {h} of rotor {j} ({abs(h * speed) / (2 * np.pi):.6g} Hz) lies on an "
+                    f"order {h:g} of rotor {j} ({abs(h * speed) / (2 * np.pi):.6g} Hz) lies on an "
                     f"undamped mode of the satellite {where}: the steady jitter would be "
                     "infinite. Give the struts damping, or change the rotor's speed"
                 )
 
 
-def _change_error(time, bus_rate, states, speeds, modes) -> np.ndarray:
+def _change_error(satellite, time, bus_rate, states, speeds, modes) -> np.ndarray:
     """Estimated relative error of the jitter's quasi-steady amplitude (n,).
 
     An amplitude that changes at the rate a lags behind by ``a / |i h Omega - lambda|``, lambda the
@@ -528,7 +616,8 @@ def _change_error(time, bus_rate, states, speeds, modes) -> np.ndarray:
         change = np.linalg.norm(np.diff(bus_rate, axis=0), axis=3) / np.diff(time)[:, None, None]
         change = np.maximum(np.append(change, change[-1:], 0), np.append(change[:1], change, 0))
         rate = np.maximum(rate, change / np.maximum(size, 1e-300))
-    s = 1j * speeds[:, :, None] * np.array(ORDERS)
+    orders = np.asarray(orders_of(satellite.disturbance))
+    s = 1j * speeds[:, :, None] * orders
     looks = np.array(sorted(modes))
     nearest = np.argmin(np.abs(np.arange(len(time))[:, None] - looks), axis=1)
     distance = np.empty(s.shape)
@@ -537,7 +626,7 @@ def _change_error(time, bus_rate, states, speeds, modes) -> np.ndarray:
         distance[near] = np.min(np.abs(s[near, ..., None] - modes[look]), axis=-1)
     distance = np.maximum(distance, 1e-300)
     if len(time) > 1:  # a line whose frequency changes passes by the mode
-        sweep = np.abs(np.gradient(speeds, time, axis=0))[:, :, None] * np.array(ORDERS)
+        sweep = np.abs(np.gradient(speeds, time, axis=0))[:, :, None] * orders
         rate = np.maximum(rate, sweep / distance)
     lag = rate / distance
     total = np.sum(size, axis=(1, 2))

@@ -26,6 +26,17 @@ def rotate(R: Float[Array, "3 3"], v: Float[Array, "*n 3"]) -> Float[Array, "*n 
     return v[..., 0:1] * R[:, 0] + v[..., 1:2] * R[:, 1] + v[..., 2:3] * R[:, 2]
 
 
+def weighted_products(
+    w: Float[Array, " k"], x: Float[Array, "k n"], y: Float[Array, "k m"]
+) -> Float[Array, "n m"]:
+    """Sum of ``w_k x_k y_k^T`` over rows: ``x.T @ diag(w) @ y``.
+
+    As a matrix product it would be a call into a library, which keeps all that stands around it
+    from being compiled in one piece; with it the equations of motion take three times as long.
+    """
+    return jnp.sum(w[:, None, None] * x[:, :, None] * y[:, None, :], axis=0)
+
+
 @jax.custom_jvp
 def solve_positive_definite(M: Float[Array, "n n"], f: Float[Array, " n"]) -> Float[Array, " n"]:
     """Solve ``M x = f`` for a small symmetric positive definite M by elimination.

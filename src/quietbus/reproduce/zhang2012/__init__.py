@@ -5,7 +5,15 @@ modules make the figures, and our values with them.
 """
 
 from quietbus.reproduce.paper import Paper, Part
-from quietbus.reproduce.zhang2012 import control, engine, flights, missing, sensitivity
+from quietbus.reproduce.zhang2012 import (
+    control,
+    engine,
+    filters,
+    flights,
+    missing,
+    per_cmg,
+    sensitivity,
+)
 from quietbus.reproduce.zhang2012.bench import Bench
 from quietbus.reproduce.zhang2012.claims import CLAIMS
 
@@ -35,6 +43,10 @@ PAPER = Paper(
             Part("margins", "Margins fall as the platform rises", missing.margins_by_height),
             Part("corner", "A corner frequency that is a peak", missing.corner),
             Part("neglected", "Fixed base, light legs, still rotors", missing.neglected),
+        ),
+        "What else could stand between CMGs and bus": (
+            Part("filters", "Six low-pass filters for the isolator", filters.filters),
+            Part("per-cmg", "One isolator per CMG", per_cmg.per_cmg),
         ),
     },
 )

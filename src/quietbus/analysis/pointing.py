@@ -1,0 +1,410 @@
+"""Pointing metrics of image motion, with statistics at a stated confidence level.
+
+What varies is the instant (or window) within the stretch that is judged, and the member of the
+ensemble: the rotors' phases, which nobody controls. ECSS-E-ST-60-10C has three interpretations of
+"within the limit with probability p":
+
+- ensemble: for a share p of the members, at all times;
+- temporal: for the worst member, a share p of the time;
+- mixed: a share p of all members and times together.
+
+The functions return the smallest limit that is met so (docs/theory.md, section 16).
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.optimize import brentq, minimize
+from scipy.stats import norm
+
+from quietbus.analysis.image_quality import mtf_loss
+from quietbus.analysis.motion import ImageMotion, SampledSignal, WindowParts
+from quietbus.analysis.windows import DRIFTS, LINEAR, Metric, gain, left_over, weight
+
+Interpretation = Literal["ensemble", "temporal", "mixed"]
+Phases = Literal["random", "given"]
+INTERPRETATIONS = ("ensemble", "temporal", "mixed")
+SEED = 20081115  # of everything that is drawn, so that a result comes out the same each time
+WINDOWS = 16384  # at most, looked at in a stretch
+DRAWS = 2**17  # of member and window together (mixed)
+MEMBERS = 2000  # at least (ensemble)
+MOST_MEMBERS = 20_000  # (ensemble); rarer ones are bounded by the worst member
+TAIL = 20  # members or more beyond the level (ensemble)
+TRIED = 2048  # windows in which the worst member is sought (temporal)
+STARTS, SWEEPS = 3, 4  # of that search
+TURN = 2.0 * np.pi
+DIRECTIONS = 120  # around the circle
+LOOKS = 16  # windows over which lines' amplitudes change (ensemble)
+
+
+@dataclass(frozen=True)
+class Statistic:
+    """What number of a metric is wanted.
+
+    Raises:
+        ValueError: a confidence level outside (0, 1), or an unknown word.
+    """
+
+    confidence: float | None = None  # None: root mean square (mean, of MTF_loss) over all
+    interpretation: Interpretation = "temporal"
+    phases: Phases = "random"  # of the rotors; given: those of the run are the only member
+
+    def __post_init__(self) -> None:
+        if self.confidence is not None and not 0.0 < self.confidence < 1.0:
+            raise ValueError(f"expected a confidence level between 0 and 1, got {self.confidence}")
+        if self.interpretation not in INTERPRETATIONS:
+            known = ", ".join(INTERPRETATIONS)
+            raise ValueError(f"interpretation: expected one of {known}; got {self.interpretation}")
+        if self.phases not in ("random", "given"):
+            raise ValueError(f"phases: expected random or given, got {self.phases}")
+
+
+def evaluate(
+    motion: ImageMotion,
+    metric: Metric,
+    stretch: tuple[float, float],
+    wanted: Statistic,
+    effort: float = 1.0,
+) -> float:
+    """A metric of image motion: [rad], or [-] of ``MTF_loss``.
+
+    Of motion with two components it is that of the distance, of ``MTF_loss`` the worst direction.
+
+    Args:
+        stretch: from, to [s]; windows lie within.
+        effort: share of the usual windows and members that are looked at.
+
+    Raises:
+        ValueError: a stretch outside the samples, or a window (and tau) longer than the stretch.
+    """
+    judge = _Judge(motion, metric, stretch, effort)
+    if wanted.confidence is None:
+        return judge.average(wanted.phases)
+    alone = motion.lines is None or wanted.phases == "given"
+    if alone:
+        if wanted.interpretation == "ensemble":
+            return float(np.max(judge.over_time(np.zeros((1, judge.rotors)))))
+        values = judge.values(np.zeros((1, judge.rotors)))
+        return float(np.quantile(values, wanted.confidence))
+    match wanted.interpretation:
+        case "temporal":
+            return judge.worst_member(wanted.confidence)
+        case "mixed":
+            return float(np.quantile(judge.draws(), wanted.confidence))
+        case _:
+            return judge.ensemble(wanted.confidence)
+
+
+def contributions(
+    motion: ImageMotion, metric: Metric, stretch: tuple[float, float]
+) -> dict[str, float]:
+    """Root mean square that slow motion and each line alone have in a metric, by name [rad].
+
+    Of ``MTF_loss`` it is that of smear and jitter, the motion within the window. Independent
+    phases: the squares add up to that of all.
+    """
+    judge = _Judge(motion, metric, stretch)
+    parts = {"slow motion" if motion.lines is not None else "motion": judge.slow_mean_square}
+    if motion.lines is not None:
+        share = weight(metric, np.abs(motion.lines.frequency) / (2.0 * np.pi))
+        power = share * np.mean(np.sum(0.5 * np.abs(judge.base) ** 2, axis=2), axis=0)
+        parts |= dict(zip(motion.lines.names, power.tolist(), strict=True))
+    return {name: float(np.sqrt(value)) for name, value in parts.items()}
+
+
+class _Judge:
+    """One metric of one motion: what its windows hold, and values for members of the ensemble."""
+
+    def __init__(
+        self,
+        motion: ImageMotion,
+        metric: Metric,
+        stretch: tuple[float, float],
+        effort: float = 1.0,
+    ):
+        self.metric, self.lines, self.effort = metric, motion.lines, effort
+        signal, (start, end) = motion.signal, stretch
+        check_stretch(float(signal.time[0]), float(signal.time[-1]), metric, stretch)
+        self.rng = np.random.default_rng(SEED)
+        count = signal.how_many(metric.window or 1.0 / signal.rate, int(effort * WINDOWS))
+        part = (np.arange(count) + self.rng.random(count)) / count
+        low = start + 0.5 * metric.span
+        self.centers = low + max(0.0, end - start - metric.span) * part
+        self.at = self.rng.random(count) - 0.5  # of an RPE's instant in its window
+        self.base = np.zeros((count, 0, signal.values.shape[1]), complex)
+        self.rotors = 0
+        if self.lines is not None and len(self.lines.frequency):
+            self.base = motion.phasors(self.centers)
+            self.rotors = int(np.max(self.lines.rotor)) + 1
+            self.f = self.lines.frequency_hz
+            u = np.pi * self.f * metric.window
+            self.same, self.other = (left_over(u[:, None], side, 2) for side in (u, -u))
+        self.slow = _slow(signal, metric, self.centers, self.at)
+        self.band = (
+            signal.mean_square_above(metric.above, start, end) if metric.name == "rms" else None
+        )
+
+    @property
+    def slow_mean_square(self) -> float:
+        """Of the signal alone, in this metric."""
+        match self.metric.name:
+            case "rms":
+                assert self.band is not None
+                return float(np.trace(self.band))
+            case "jitter":
+                assert isinstance(self.slow, WindowParts)
+                return float(np.mean(np.trace(self.slow.about_line, axis1=1, axis2=2)))
+            case "MTF_loss":
+                assert isinstance(self.slow, WindowParts)
+                return float(np.mean(np.trace(self.slow.about_mean, axis1=1, axis2=2)))
+            case _:
+                assert isinstance(self.slow, np.ndarray)
+                return float(np.mean(np.sum(self.slow**2, axis=1)))
+
+    def phasors(self, turns: np.ndarray, which: np.ndarray | slice) -> np.ndarray:
+        """Phasors (n, group, c) in windows ``which`` for members' turns (n or 1, rotor)."""
+        if self.lines is None or not self.rotors:
+            return self.base[which]
+        shift = np.exp(1j * self.lines.order * turns[:, self.lines.rotor])
+        return self.lines.together(self.base[which] * shift[..., None])
+
+    def values(self, turns: np.ndarray, which: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """The metric (n,) in windows ``which`` for members (n or 1, rotor)."""
+        z = self.phasors(turns, which)
+        if self.metric.name in LINEAR:
+            assert isinstance(self.slow, np.ndarray)
+            moved = self.slow[which]
+            if self.rotors:
+                g = gain(self.metric, self.f, self.at[which][:, None])
+                g = np.broadcast_to(g, z.shape[:2])[..., None]
+                moved = moved + np.sum(g * z, axis=1).real
+            return np.linalg.norm(moved, axis=1)
+        return self._squared(z, which)
+
+    def _squared(self, z: np.ndarray, which: np.ndarray | slice) -> np.ndarray:
+        if self.metric.name == "rms":
+            assert self.band is not None
+            total = np.full(len(z), np.trace(self.band))
+            if self.rotors:
+                share = weight(self.metric, self.f)
+                total = total + 0.5 * np.einsum("g,ngc->n", share, np.abs(z) ** 2)
+            return np.sqrt(total)
+        assert isinstance(self.slow, WindowParts)
+        covariance, smear = self.slow.about_line[which], self.slow.smear[which]
+        if self.rotors:
+            covariance = covariance + self._jitter_of_lines(z)
+            drift = Metric("smear", self.metric.window)
+            smear = smear + np.sum(gain(drift, self.f)[:, None] * z, axis=1).real
+        if self.metric.name == "jitter":
+            return np.sqrt(np.trace(covariance, axis1=1, axis2=2))
+        directions = half_circle(z.shape[2])
+        return mtf_loss(covariance, smear, self.metric.spatial_frequency, directions)
+
+    def _jitter_of_lines(self, z: np.ndarray) -> np.ndarray:
+        """(n, c, c) of coherent lines z about their mean and slope, exactly."""
+        mixed = self.same @ z.conj() + self.other @ z
+        return np.asarray(0.5 * (z.swapaxes(1, 2) @ mixed).real)
+
+    def average(self, phases: Phases) -> float:
+        """Root mean square over windows and members; of MTF_loss the mean."""
+        if self.metric.name == "MTF_loss":
+            if self.lines is None or phases == "given":
+                return float(np.mean(self.values(np.zeros((1, self.rotors)))))
+            return float(np.mean(self.draws()))
+        total = self.slow_mean_square
+        if self.rotors and self.lines is not None:
+            if phases == "random":
+                f, z = np.abs(self.lines.frequency) / (2.0 * np.pi), self.base
+            else:
+                f, z = self.f, self.lines.together(self.base)
+            power = np.mean(np.sum(0.5 * np.abs(z) ** 2, axis=2), axis=0)
+            total += float(weight(self.metric, f) @ power)
+        return float(np.sqrt(total))
+
+    def draws(self) -> np.ndarray:
+        """Values of members and windows drawn together, each independent of the others."""
+        values = []
+        for _ in range(8):
+            n = int(self.effort * DRAWS) // 8
+            which = self.rng.integers(len(self.centers), size=n)
+            values.append(self.values(self.rng.uniform(0, 2 * np.pi, (n, self.rotors)), which))
+        return np.concatenate(values)
+
+    def worst_member(self, confidence: float) -> float:
+        """Largest quantile over time that any member has, as far as the search finds.
+
+        Members that reach far are tried in some windows; the best is improved there, and judged
+        with the runners-up in all windows.
+        """
+        some = np.linspace(0, len(self.centers) - 1, min(TRIED, len(self.centers))).astype(int)
+        quantile = lambda turns, which: float(  # noqa: E731
+            np.quantile(self.values(turns[None], which), confidence)
+        )
+        tried = self.far_reaching()
+        first = np.array([quantile(turns, some) for turns in tried])
+        best = tried[np.argsort(-first)[:3]]
+        improved = minimize(
+            lambda turns: -quantile(turns, some) / (np.max(first) or 1.0),
+            best[0],
+            method="Nelder-Mead",
+            options={"maxfev": 25 * self.rotors, "xatol": 1e-2, "fatol": 1e-4},
+        )
+        return max(quantile(turns, slice(None)) for turns in (*best, improved.x))
+
+    def far_reaching(self) -> np.ndarray:
+        """Members (n, rotor) whose lines together reach far along some direction, each.
+
+        For each direction the sum over frequencies of what the lines reach is raised by turning
+        one rotor after the other, from several starts.
+        """
+        if self.lines is None or not self.rotors:
+            return np.zeros((1, 0))
+        middle = self.base[len(self.base) // 2]
+        backwards = self.lines.frequency < 0.0
+        folded = np.where(backwards[:, None], middle.conj(), middle)
+        order = np.where(backwards, -1.0, 1.0) * self.lines.order
+        share = np.sqrt(np.maximum(weight(self.metric, np.abs(self.lines.frequency) / TURN), 0.0))
+        along = np.repeat(share * (half_circle(middle.shape[1])[::6] @ folded.T), STARTS, axis=0)
+        turns = self.rng.uniform(0.0, TURN, (len(along), self.rotors))
+        member = (self.lines.groups[:, None] == np.arange(self.lines.count)).astype(float)
+        steps = TURN * np.arange(96) / 96
+        for _ in range(SWEEPS):
+            for j in range(self.rotors):
+                own = self.lines.rotor == j
+                z = along * np.exp(1j * order * turns[:, self.lines.rotor])
+                rest = (z * ~own) @ member
+                turned = along[:, None] * own * np.exp(1j * order * steps[:, None])
+                reach = np.sum(np.abs(rest[:, None] + turned @ member), axis=2)
+                turns[:, j] = steps[np.argmax(reach, axis=1)]
+        return turns
+
+    def ensemble(self, confidence: float) -> float:
+        """Quantile over members of the largest value at any time."""
+        count = int(self.effort * max(MEMBERS, np.ceil(TAIL / (1.0 - confidence))))
+        if count > self.effort * MOST_MEMBERS:
+            return float(np.max(self.over_time(self.far_reaching())))
+        members = self.rng.uniform(0, 2 * np.pi, (count, self.rotors))
+        parts = [self.over_time(members[i : i + 500]) for i in range(0, count, 500)]
+        return float(np.quantile(np.concatenate(parts), confidence, method="higher"))
+
+    def over_time(self, members: np.ndarray) -> np.ndarray:
+        """Largest value (n,) at any time for members (n, rotor).
+
+        Lines of different frequency beat, so that sooner or later all of them peak together: an
+        upper bound where they are few turns of a beat or multiples of one speed.
+        """
+        looks = np.unique(np.linspace(0, len(self.centers) - 1, LOOKS).astype(int))
+        if self.metric.name not in LINEAR:
+            looks = np.unique(np.linspace(0, len(self.centers) - 1, 4 * LOOKS).astype(int))
+            each = [self.values(members, np.full(len(members), k)) for k in looks]
+            return np.asarray(np.max(each, axis=0))
+        assert isinstance(self.slow, np.ndarray)
+        if not self.rotors:
+            return np.full(len(members), np.max(np.linalg.norm(self.slow, axis=1)))
+        around = full_circle(self.base.shape[2])
+        at = np.linspace(-0.5, 0.5, 33)[:, None] if self.metric.name == "RPE" else np.zeros((1, 1))
+        most = np.max(np.abs(np.atleast_2d(gain(self.metric, self.f, at))), axis=0)
+        stretches = np.array_split(np.arange(len(self.centers)), len(looks))
+        largest = np.zeros(len(members))
+        for look, these in zip(looks, stretches, strict=True):
+            z = self.phasors(members, np.full(len(members), look))
+            reach = np.abs(np.einsum("ngc,dc->ngd", z, around))
+            slow = np.max(self.slow[these] @ around.T, axis=0)
+            total = np.max(np.einsum("g,ngd->nd", most, reach) + slow, axis=1)
+            largest = np.maximum(largest, total)
+        # the true direction lies half a step at most from those looked at
+        return largest / (np.cos(np.pi / DIRECTIONS) if len(around) > 2 else 1.0)
+
+
+def check_stretch(first: float, last: float, metric: Metric, stretch: tuple[float, float]) -> None:
+    """Refuse a stretch outside a run from first to last [s], and a window longer than the stretch.
+
+    Raises:
+        ValueError: says which.
+    """
+    start, end = stretch
+    slack = 1e-9 * max(1.0, last)
+    if not (first - slack <= start < end <= last + slack):
+        raise ValueError(
+            f"expected a stretch within the run, {first:g} s to {last:g} s; got {start:g} s to "
+            f"{end:g} s"
+        )
+    if metric.span > (end - start) * (1.0 + 1e-9):
+        what = "window and tau together" if metric.name in DRIFTS else "a window"
+        raise ValueError(
+            f"expected {what} of at most {end - start:g} s, the stretch judged ({start:g} s to "
+            f"{end:g} s); got {metric.span:g} s"
+        )
+
+
+def _slow(
+    signal: SampledSignal, metric: Metric, centers: np.ndarray, at: np.ndarray
+) -> np.ndarray | WindowParts:
+    """What the signal's windows hold, as far as the metric asks: deviations (n, c), or all."""
+    if metric.name in ("APE", "rms"):
+        return signal.at(centers)
+    if metric.name in DRIFTS:
+        first, second = (
+            signal.windows(centers + sign * 0.5 * metric.tau, metric.window).mean
+            for sign in (-1.0, 1.0)
+        )
+        return second - first
+    parts = signal.windows(centers, metric.window)
+    match metric.name:
+        case "MPE" | "displacement":
+            return parts.mean
+        case "smear":
+            return parts.smear
+        case "RPE":
+            return signal.at(centers + at * metric.window) - parts.mean
+        case _:
+            return parts
+
+
+def half_circle(components: int) -> np.ndarray:
+    """Directions (d, c) of which each opposite pair has one."""
+    return full_circle(components)[: max(1, DIRECTIONS // 2)] if components > 1 else np.ones((1, 1))
+
+
+def full_circle(components: int) -> np.ndarray:
+    """Unit vectors (d, c) all around, of one or two components."""
+    if components == 1:
+        return np.array([[1.0], [-1.0]])
+    if components != 2:
+        raise ValueError(f"image motion has one or two components, got {components}")
+    angle = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    return np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def gaussian_radius(confidence: float, covariance: np.ndarray) -> float:
+    """Distance within which a Gaussian deviation stays with probability ``confidence``.
+
+    Of one component abs(x), of two the length of the vector; of equal variances that is
+    Rayleigh's ``sigma sqrt(-2 ln(1 - p))``. An ergodic process has the same over time, so that
+    temporal and mixed interpretation agree.
+
+    Args:
+        covariance: (c, c), c = 1 or 2.
+    """
+    Statistic(confidence)
+    size = np.linalg.eigvalsh(np.atleast_2d(covariance))
+    if len(size) > 2:
+        raise ValueError(f"image motion has one or two components, got {len(size)}")
+    variances = size[size > 1e-14 * size[-1]] if size[-1] > 0.0 else size[:0]
+    if not len(variances):
+        return 0.0
+    angle = np.pi * (np.arange(4096) + 0.5) / 4096
+    low, high = variances[0], variances[-1]
+
+    def beyond(ratio: float) -> float:
+        """Probability of more than ``ratio`` times the larger sigma."""
+        if len(variances) == 1:
+            return float(2.0 * norm.sf(ratio))
+        # polar coordinates: the radius integrates in closed form for each direction
+        precision = np.cos(angle) ** 2 / high + np.sin(angle) ** 2 / low
+        tail = np.exp(-0.5 * ratio**2 * high * precision) / precision
+        return float(np.mean(tail) / np.sqrt(low * high))
+
+    ratio = brentq(lambda r: beyond(r) - (1.0 - confidence), 0.0, 40.0, xtol=1e-12)
+    return float(ratio * np.sqrt(high))

@@ -1,0 +1,466 @@
+"""Measured speed-frequency maps (waterfalls) of a rotor's forces and torques: files and fit."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from pydantic_core import PydanticCustomError
+from scipy.signal import get_window
+
+from quietbus.analysis.waterfall import WINDOWS, ComponentFit, FitError, Waterfall, fit
+from quietbus.scenario import Problem, ScenarioError
+from quietbus.scenario.text import write_yaml
+from quietbus.scenario.units import Quantity, shown
+from quietbus.scenario.wheel_files import KINDS
+
+KEYS = ("component", "unit", "speed_unit", "frequency_unit", "window", "sample_rate")
+_SPEED = Quantity("a rotor speed", "rad/s", above=0.0)
+_FREQUENCY = Quantity("a frequency", "Hz", least=0.0)
+_PSD = {
+    "force": Quantity("a power spectral density", "N^2/Hz", exact=True),
+    "torque": Quantity("a power spectral density", "N^2*m^2/Hz", exact=True),
+}
+_AMPLITUDE = {"force": Quantity("an amplitude", "N"), "torque": Quantity("an amplitude", "N*m")}
+_EVEN = 1e-3  # relative difference of steps of frequency
+_SNAP = 2e-3  # orders as near to a whole number are taken as that
+
+
+class MapError(ScenarioError):
+    """A measured map that cannot be used: file, place, what was expected and what came."""
+
+
+def read_waterfall(path: str | os.PathLike[str]) -> xr.Dataset:
+    """Read a measured map from CSV or NetCDF, checked and in SI.
+
+    The layouts are those of docs/import.md. Values become one-sided power spectral densities.
+
+    Returns:
+        A variable (speed, frequency) for each component among ``radial_force``, ``axial_force``,
+        ``radial_torque`` and ``axial_torque``, its ``window`` an attribute.
+
+    Raises:
+        MapError: everything wrong with the file.
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise MapError(str(file), [Problem("no such file")])
+    return _read_netcdf(file) if _is_netcdf(file) else _read_csv(file)
+
+
+def _is_netcdf(file: Path) -> bool:
+    with file.open("rb") as opened:
+        return opened.read(4) in (b"\x89HDF", b"CDF\x01", b"CDF\x02")
+
+
+class _Check:
+    """Reads and checks the parts of a map, and collects what is wrong."""
+
+    def __init__(self, file: Path) -> None:
+        self.file = file
+        self.problems: list[Problem] = []
+
+    def wrong(self, message: str, column: str = "", line: int | None = None) -> None:
+        self.problems.append(Problem(message, (column,) if column else (), line))
+
+    def raise_any(self) -> None:
+        if self.problems:
+            raise MapError(str(self.file), self.problems)
+
+    def factor(self, quantity: Quantity, unit: str, where: str) -> float | None:
+        """SI per unit, or None if the unit is another quantity's."""
+        try:
+            return quantity.read(f"1 {unit}")
+        except PydanticCustomError as error:
+            self.wrong(str(error), where)
+            return None
+
+    def component(
+        self,
+        name: str,
+        speed: np.ndarray,
+        frequency: np.ndarray,
+        values: np.ndarray,
+        about: dict[str, str],
+    ) -> xr.DataArray | None:
+        """One map in SI, or None if it has problems."""
+        before = len(self.problems)
+        if name not in KINDS:
+            self.wrong(f"expected one of {', '.join(KINDS)}, got {shown(name)}", "component")
+            return None
+        window = about.get("window", "hann")
+        if window not in WINDOWS:
+            self.wrong(f"expected one of {', '.join(WINDOWS)}, got {shown(window)}", "window")
+        per_speed = self._unit(_SPEED, about, "speed_unit")
+        per_frequency = self._unit(_FREQUENCY, about, "frequency_unit", "Hz")
+        kind, unit = name.rpartition("_")[2], about.get("unit", "")
+        power, factor = self._value_unit(kind, unit)
+        self.axis("speed", speed, "above 0", speed > 0.0)
+        self.axis("frequency", frequency, "at least 0", frequency >= 0.0)
+        if values.shape != (len(speed), len(frequency)):
+            self.wrong(
+                f"expected {len(speed)} x {len(frequency)} values, speeds by frequencies, got "
+                f"{' x '.join(map(str, values.shape))}",
+                name,
+            )
+        elif not np.all(np.isfinite(values)) or np.any(values < 0.0):
+            i, k = np.argwhere(~(np.isfinite(values) & (values >= 0.0)))[0]
+            self.wrong(
+                f"expected numbers of at least 0, got {values[i, k]:g} at speed {speed[i]:g} and "
+                f"frequency {frequency[k]:g}",
+                name,
+            )
+        if len(self.problems) > before:
+            return None
+        assert per_speed is not None
+        assert per_frequency is not None
+        hertz = frequency * per_frequency
+        steps = np.diff(hertz)
+        if np.ptp(steps) > _EVEN * np.mean(steps):
+            self.wrong("expected evenly spaced frequencies, as of a spectrum", "frequency")
+        self._nyquist(about, hertz)
+        if len(self.problems) > before:
+            return None
+        values = values * factor
+        if not power:
+            values = 0.5 * values**2 / (noise_bandwidth(window) * np.mean(steps))
+        coordinates = {
+            "speed": ("speed", speed * per_speed, {"units": "rad/s"}),
+            "frequency": ("frequency", hertz, {"units": "Hz"}),
+        }
+        attributes = {
+            "units": _PSD[kind].unit,
+            "long_name": f"one-sided power spectral density of the {name.replace('_', ' ')}",
+            "window": window,
+        }
+        return xr.DataArray(values, coordinates, ("speed", "frequency"), name, attributes)
+
+    def _unit(
+        self, quantity: Quantity, about: dict[str, str], key: str, default: str = ""
+    ) -> float | None:
+        unit = about.get(key, default)
+        if not unit:
+            self.wrong(f"expected a unit, such as {quantity.unit}, got none", key)
+            return None
+        return self.factor(quantity, unit, key)
+
+    def _value_unit(self, kind: str, unit: str) -> tuple[bool, float]:
+        """Whether values are powers, and SI per unit."""
+        for power, quantity in ((True, _PSD[kind]), (False, _AMPLITUDE[kind])):
+            try:
+                return power, quantity.read(f"1 {unit}") if unit else math.nan
+            except PydanticCustomError:
+                continue
+        self.wrong(
+            f"expected a power spectral density in {_PSD[kind].unit} or an amplitude in "
+            f"{_AMPLITUDE[kind].unit}, got {shown(unit)}",
+            "unit",
+        )
+        return True, math.nan
+
+    def axis(self, name: str, values: np.ndarray, what: str, fine: np.ndarray) -> None:
+        """An axis of a map is long enough, in order and of the right sign."""
+        if len(values) < 3:
+            self.wrong(f"expected at least three, got {len(values)}", name)
+        for i in np.flatnonzero(~(np.isfinite(values) & fine))[:1]:
+            self.wrong(f"expected numbers {what}, got {values[i]:g}", name)
+        for i in np.flatnonzero(np.diff(values) <= 0.0)[:1]:
+            self.wrong(
+                f"expected ascending values, got {values[i + 1]:g} after {values[i]:g}", name
+            )
+
+    def _nyquist(self, about: dict[str, str], hertz: np.ndarray) -> None:
+        if not about.get("sample_rate"):
+            return
+        try:
+            rate = Quantity("a frequency", "Hz", above=0.0).read(about["sample_rate"])
+        except PydanticCustomError as error:
+            self.wrong(str(error), "sample_rate")
+            return
+        if hertz[-1] > 0.5 * rate * (1.0 + 1e-9):
+            self.wrong(
+                f"expected at most {0.5 * rate:g} Hz, the Nyquist frequency of the sample_rate, "
+                f"got {hertz[-1]:g}",
+                "frequency",
+            )
+
+
+def noise_bandwidth(window: str) -> float:
+    """Equivalent noise bandwidth of a spectrum's window [bins]."""
+    if window == "none":
+        return 1.0
+    values = get_window(window, 4096)
+    return float(len(values) * np.sum(values**2) / np.sum(values) ** 2)
+
+
+def _read_netcdf(file: Path) -> xr.Dataset:
+    check = _Check(file)
+    try:
+        with xr.open_dataset(file) as stored:
+            data = stored.load()
+    except (OSError, ValueError, KeyError) as error:
+        raise MapError(str(file), [Problem(f"not a NetCDF file ({error})")]) from None
+    wanted = [name for name in data.data_vars if name in KINDS]
+    for name in ("speed", "frequency"):
+        if name not in data.coords:
+            check.wrong(f"expected a coordinate '{name}', got {', '.join(map(str, data.coords))}")
+    if not wanted:
+        check.wrong(
+            f"expected variables among {', '.join(KINDS)}, got "
+            f"{', '.join(map(str, data.data_vars)) or 'none'}"
+        )
+    check.raise_any()
+    maps = []
+    for name in wanted:
+        array = data[name]
+        if set(array.dims) != {"speed", "frequency"}:
+            got = ", ".join(map(str, array.dims))
+            check.wrong(f"expected dimensions speed, frequency, got {got}", str(name))
+            continue
+        attributes = data.attrs | array.attrs
+        about = {
+            key: str(attributes[key]) for key in ("window", "sample_rate") if key in attributes
+        }
+        about["unit"] = str(array.attrs.get("units", ""))
+        for axis in ("speed", "frequency"):
+            about[f"{axis}_unit"] = str(data[axis].attrs.get("units", ""))
+        values = array.transpose("speed", "frequency").to_numpy().astype(float)
+        speed, frequency = (data[a].to_numpy().astype(float) for a in ("speed", "frequency"))
+        maps.append(check.component(str(name), speed, frequency, values, about))
+    check.raise_any()
+    return xr.merge([each for each in maps if each is not None])
+
+
+def _read_csv(file: Path) -> xr.Dataset:
+    """A matrix with frequencies in the first row and speeds in the first column, or long rows."""
+    check = _Check(file)
+    try:
+        lines = file.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise MapError(str(file), [Problem(f"cannot be read as text: {error}")]) from None
+    about: dict[str, str] = {}
+    rows: list[tuple[int, list[str]]] = []
+    for number, line in enumerate(lines, 1):
+        if line.startswith("#"):
+            key, colon, value = line[1:].partition(":")
+            if colon and key.strip() in KEYS:
+                about[key.strip()] = value.strip()
+        elif line.strip():
+            cells = next(csv.reader([line], delimiter=";" if ";" in line else ","))
+            rows.append((number, [cell.strip() for cell in cells]))
+    if len(rows) < 2:
+        check.wrong("expected a row of frequencies and one for each speed, got no map")
+    check.raise_any()
+    if "frequency" in [cell.lower() for cell in rows[0][1]]:
+        maps = _long(check, rows, about)
+    else:
+        maps = [_matrix(check, rows, about)]
+    check.raise_any()
+    return xr.merge([each for each in maps if each is not None])
+
+
+def _numbers(check: _Check, cells: Sequence[str], line: int) -> list[float]:
+    found = []
+    for column, cell in enumerate(cells, 1):
+        try:
+            found.append(float(cell))
+        except ValueError:
+            check.wrong(f"expected a number, got {shown(cell)}", f"column {column}", line)
+            found.append(math.nan)
+    return found
+
+
+def _matrix(
+    check: _Check, rows: list[tuple[int, list[str]]], about: dict[str, str]
+) -> xr.DataArray | None:
+    line, head = rows[0]
+    frequency = np.array(_numbers(check, head[1:], line))
+    speed, values = [], []
+    for number, cells in rows[1:]:
+        if len(cells) != len(head):
+            check.wrong(f"expected {len(head)} cells, got {len(cells)}", line=number)
+            continue
+        first, *rest = _numbers(check, cells, number)
+        speed.append(first)
+        values.append(rest)
+    check.raise_any()
+    name = about.get("component", "")
+    return check.component(name, np.array(speed), frequency, np.array(values), about)
+
+
+def _long(
+    check: _Check, rows: list[tuple[int, list[str]]], about: dict[str, str]
+) -> list[xr.DataArray | None]:
+    line, head = rows[0]
+    head = [cell.lower() for cell in head]
+    known = ("component", "speed", "frequency", "value")
+    for name in head:
+        if name not in known:
+            check.wrong(f"unknown column {shown(name)}; known: {', '.join(known)}", line=line)
+    for name in known[1:]:
+        if name not in head:
+            check.wrong(f"expected a column '{name}', got {', '.join(head)}", line=line)
+    check.raise_any()
+    points: dict[str, dict[tuple[float, float], float]] = {}
+    for number, cells in rows[1:]:
+        if len(cells) != len(head):
+            check.wrong(f"expected {len(head)} cells, got {len(cells)}", line=number)
+            continue
+        row = dict(zip(head, cells, strict=True))
+        component = row.get("component") or about.get("component", "")
+        speed, frequency, value = _numbers(check, [row[name] for name in known[1:]], number)
+        place = points.setdefault(component, {})
+        if (speed, frequency) in place:
+            check.wrong(
+                f"speed {speed:g} and frequency {frequency:g} stand here twice", line=number
+            )
+        place[speed, frequency] = value
+    check.raise_any()
+    maps = []
+    for component, place in points.items():
+        speeds, frequencies = (np.array(sorted({at[i] for at in place})) for i in range(2))
+        values = np.full((len(speeds), len(frequencies)), np.nan)
+        for (speed, frequency), value in place.items():
+            values[np.searchsorted(speeds, speed), np.searchsorted(frequencies, frequency)] = value
+        missing = values.size - len(place)
+        if missing:
+            check.wrong(f"expected every speed with every frequency; {missing} are missing",
+                        component)  # fmt: skip
+            continue
+        maps.append(check.component(component, speeds, frequencies, values, about))
+    return maps
+
+
+@dataclass(frozen=True, eq=False)
+class WaterfallFit:
+    """What the maps of a rotor say: orders, modes on its bearings, broadband floor."""
+
+    components: dict[str, ComponentFit]
+
+    def to_dict(self) -> dict[str, Any]:
+        """All fitted numbers with their standard deviations, for JSON."""
+        return {
+            "components": {name: each.to_dict() for name, each in self.components.items()},
+            "disturbance": self.disturbance(),
+        }
+
+    def disturbance(self) -> dict[str, Any]:
+        """The scenario's ``rotor.disturbance``.
+
+        Orders of several components that agree within three standard deviations or 0.2 % are one;
+        those as near to a whole number are that number. Phases are random: a map has none.
+        """
+        orders: list[dict[str, Any]] = []
+        found = [(line, name) for name, each in self.components.items() for line in each.orders]
+        for line, name in sorted(found, key=lambda pair: pair[0].order.value):
+            value = line.order.value
+            near = max(3.0 * line.order.deviation, _SNAP * min(value, 1.0))
+            if round(value) >= 1 and abs(value - round(value)) < near:
+                value = float(round(value))
+            same = next(
+                (
+                    o
+                    for o in orders
+                    if abs(o["order"] - value) < near
+                    and o.get("whirl", "forward") == line.whirl
+                    and name not in o
+                ),
+                None,
+            )
+            if same is None:
+                same = {"order": value}
+                if line.whirl == "backward":
+                    same["whirl"] = "backward"
+                orders.append(same)
+            same[name] = line.coefficient.value
+        orders = [order | {"phase": "random"} for order in orders]
+        orders.sort(key=lambda order: (order["order"], order.get("whirl") == "backward"))
+        resonances = {}
+        for name, key in (
+            ("radial_force", "radial"),
+            ("axial_force", "axial"),
+            ("radial_torque", "rocking"),
+        ):
+            mode = self.components[name].mode if name in self.components else None
+            if mode is not None:
+                resonances[key] = {
+                    "frequency": mode.frequency.value,
+                    "damping": mode.damping.value,
+                }
+        broadband = {
+            name: {"frequency": each.floor_frequency.tolist(), "psd": each.rotor_floor.tolist()}
+            for name, each in self.components.items()
+        }
+        block: dict[str, Any] = {"orders": orders}
+        if resonances:
+            block["resonances"] = resonances
+        return _rounded(block | {"broadband": broadband})
+
+    def to_yaml(self) -> str:
+        """YAML text of the block ``disturbance``, in SI units."""
+        return write_yaml({"disturbance": self.disturbance()})
+
+    def to_dataset(self) -> xr.Dataset:
+        """Maps: measured, fitted and residual, by component."""
+        data = {}
+        for name, each in self.components.items():
+            unit = {"units": _PSD[name.rpartition("_")[2]].unit}
+            for what, values, attributes in (
+                ("measured", each.measured.psd, unit),
+                ("fitted", each.fitted, unit),
+                ("residual", each.residual_db, {"units": "dB"}),
+            ):
+                data[f"{name}_{what}"] = (("speed", "frequency"), values, attributes)
+        first = next(iter(self.components.values())).measured
+        coordinates = {
+            "speed": ("speed", first.speed, {"units": "rad/s"}),
+            "frequency": ("frequency", first.frequency, {"units": "Hz"}),
+        }
+        return xr.Dataset(data, coordinates)
+
+
+def _rounded(data: Any) -> Any:
+    """Six digits, more than any fit is good for, which can be read."""
+    if isinstance(data, dict):
+        return {key: _rounded(value) for key, value in data.items()}
+    if isinstance(data, list):
+        return [_rounded(value) for value in data]
+    return float(f"{data:.6g}") if isinstance(data, float) else data
+
+
+def fit_waterfall(maps: xr.Dataset | str | os.PathLike[str], most: int = 20) -> WaterfallFit:
+    """Fit orders, coefficients, modes on the bearings and broadband floor to measured maps.
+
+    Args:
+        maps: as of ``read_waterfall``, or the path of a file for it.
+        most: number of orders that are looked for in each component.
+
+    Raises:
+        MapError: the file is wrong.
+        FitError: too few speeds, or no order stands out; it names the component.
+    """
+    data = maps if isinstance(maps, xr.Dataset) else read_waterfall(maps)
+    fits = {}
+    for name in (kind for kind in KINDS if kind in data):
+        array = data[name].transpose("speed", "frequency")
+        measured = Waterfall(
+            name,
+            array["speed"].to_numpy(),
+            array["frequency"].to_numpy(),
+            array.to_numpy(),
+            array.attrs.get("window", "hann"),
+        )
+        try:
+            fits[name] = fit(measured, most)
+        except FitError as error:
+            raise FitError(f"{name}: {error}") from None
+    if not fits:
+        raise FitError(f"expected variables among {', '.join(KINDS)}, got none")
+    return WaterfallFit(fits)

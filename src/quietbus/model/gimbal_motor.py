@@ -1,0 +1,88 @@
+"""Gimbal motors that do not follow their command smoothly: torque ripple and steps.
+
+Both repeat over a turn of the gimbal: lines exp(i n gamma). They accelerate the gimbal on top of
+what its servo asks for, and depend on the gimbal's rate: a gimbal at rest is not moved by them
+(docs/theory.md, section 15).
+"""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Complex, Float
+
+from quietbus.model.cmg import ControlMomentGyro
+
+
+class GimbalMotor(eqx.Module):
+    """Ripple torque and stepping, alike for all units."""
+
+    per_turn: Float[Array, " ripple"]  # [-] periods of the ripple in a turn of the gimbal
+    torque: Float[Array, " ripple"]  # [N m]
+    phase: Float[Array, " ripple"]  # [rad] against per_turn times gimbal angle
+    holding: Float[Array, ""]  # [rad/s] ripple slower than this is held
+    step_per_turn: Float[Array, " harmonic"]  # [-] multiples of the number of steps in a turn
+    step_turn: Float[Array, " harmonic"]  # [rad] amplitude of a step's harmonic
+    step_frequency: Float[Array, ""]  # [rad/s] undamped, of the gimbal about a step
+    step_damping: Float[Array, ""]  # [-] over critical damping
+
+    @property
+    def order(self) -> Float[Array, " line"]:
+        """Lines in a turn of the gimbal, of ripple and of steps."""
+        return jnp.concatenate([self.per_turn, self.step_per_turn])
+
+    def amplitudes(
+        self, cluster: ControlMomentGyro, gamma_rate: Float[Array, " cmg"]
+    ) -> Complex[Array, "cmg line"]:
+        """Gimbal accelerations [rad/s^2] by each line, Re(amplitude exp(i n gamma)).
+
+        Ripple: T w^2 / (w^2 + w_h^2) over the gimbal's inertia, w = n dgamma/dt. Steps: the field
+        runs ahead of the mean by the saw tooth sum sin(k N gamma) 2 / (k N); the gimbal follows
+        it as a damped oscillator.
+        """
+        rate = gamma_rate[:, None]
+        square = (self.per_turn * rate) ** 2
+        shared = square / (square + self.holding**2)
+        ripple = shared * self.torque * jnp.exp(1j * self.phase)
+        ripple = ripple / gimbal_inertia(cluster)[:, None]
+        s = 1j * self.step_per_turn * rate
+        oscillator = self.step_frequency**2 + 2.0 * self.step_damping * self.step_frequency * s
+        follows = self.step_frequency**2 / (oscillator + s**2)
+        return jnp.concatenate([ripple, -1j * self.step_turn * s**2 * follows], axis=1)
+
+    def modulation(
+        self,
+        cluster: ControlMomentGyro,
+        gamma_rate: Float[Array, "n cmg"],
+        bandwidth: Float[Array, ""],
+    ) -> Float[Array, "n cmg line"]:
+        """Amplitude [rad] by which each line shifts its own phase n gamma, through the servo.
+
+        Small where the lines follow from the mean motion of the gimbal alone.
+        """
+        pushed = jax.vmap(lambda rate: jnp.abs(self.amplitudes(cluster, rate)))(gamma_rate)
+        omega = jnp.abs(self.order * gamma_rate[..., None])
+        answer = omega * jnp.sqrt(omega**2 + bandwidth**2)
+        return self.order * pushed / jnp.where(omega > 0.0, answer, 1.0)
+
+    def acceleration(
+        self,
+        cluster: ControlMomentGyro,
+        gamma: Float[Array, " cmg"],
+        gamma_rate: Float[Array, " cmg"],
+    ) -> Float[Array, " cmg"]:
+        """Gimbal accelerations [rad/s^2] at gimbal angles [rad] and rates [rad/s]."""
+        turned = jnp.exp(1j * self.order * gamma[:, None])
+        return jnp.sum((self.amplitudes(cluster, gamma_rate) * turned).real, axis=1)
+
+
+def gimbal_inertia(cluster: ControlMomentGyro) -> Float[Array, " cmg"]:
+    """Inertia [kg m^2] of gimbal body and rotor about the gimbal axis, mean over the rotor's turn.
+
+    Static imbalance, whose share is of second order, is left out.
+    """
+    across = lambda r: r[:, 0] ** 2 + r[:, 1] ** 2  # noqa: E731
+    body = cluster.I_GGcm_G[:, 2, 2] + cluster.gimbal_mass * across(cluster.p_CGcm_G)
+    spin = cluster.I_RRcm_R[:, 0, 0]
+    other = 0.5 * (cluster.I_RRcm_R[:, 1, 1] + cluster.I_RRcm_R[:, 2, 2])
+    rotor = other + (spin - other) * cluster.R_GF[:, 2, 0] ** 2
+    return body + rotor + cluster.rotor_mass * across(cluster.p_CR_G)

@@ -1,0 +1,168 @@
+"""Pictures of pointing: cumulative power spectra by contributor, metrics against exposure time."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from quietbus.analysis.power import Density, LinePower, cumulative
+from quietbus.analysis.spectrum import detrended
+from quietbus.plots.jitter import log_scale
+from quietbus.plots.style import COLOURS, DASHES, explain, new_figure, share_legend, style
+from quietbus.verification import ARCSEC
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from quietbus.analysis.motion import ImageMotion
+    from quietbus.analysis.power import Power
+    from quietbus.verification import Verdict, Verification
+
+MOST_NAMED = 10  # contributors in a picture; the others are one
+LEAST_SHARE = 1e-3  # of the RMS of all lines, that a line has to have to be named
+
+
+def pointing_figures(verification: Verification) -> dict[str, Figure]:
+    """All pictures of a verification by name: of each line of sight, and of all requirements."""
+    with style():
+        figures = {
+            f"cumulative-{name}": cumulative_spectrum(
+                f"Image motion of {name} ({verification.scenario.name}, "
+                f"{verification.run.attrs['mount']})",
+                powers(verification.motion(name), _stretch(verification, name)),
+            )
+            for name in dict.fromkeys(v.line_of_sight for v in verification.verdicts)
+        }
+        return figures | {"exposure": exposure(verification)}
+
+
+def _stretch(verification: Verification, name: str) -> tuple[float, float]:
+    """The longest stretch over which a line of sight is judged."""
+    own = [v.stretch for v in verification.verdicts if v.line_of_sight == name]
+    return max(own, key=lambda stretch: stretch[1] - stretch[0])
+
+
+def powers(motion: ImageMotion, stretch: tuple[float, float]) -> dict[str, Power]:
+    """Mean square [rad^2] of an image motion by frequency: each rotor's line, and the signal.
+
+    The signal's density is a periodogram with a Hann window, its cubic trend taken off.
+    """
+    signal, (start, end) = motion.signal, stretch
+    here = (signal.time >= start - 1e-9) & (signal.time <= end + 1e-9)
+    parts: dict[str, Power] = {}
+    if np.count_nonzero(here) >= 16:
+        y = detrended(signal.time[here], signal.values[here])
+        w = np.hanning(len(y) + 1)[:-1, None]
+        f = np.fft.rfftfreq(len(y), 1.0 / signal.rate)
+        density = 2.0 * np.sum(np.abs(np.fft.rfft(w * y, axis=0)) ** 2, axis=1)
+        density /= signal.rate * np.sum(w**2)
+        name = "motion" if motion.lines is None else "slow motion, trend off"
+        parts[name] = Density(f, density)
+    if motion.lines is None:
+        return parts
+    lines = motion.lines
+    mean = np.mean(np.sum(0.5 * np.abs(lines.amplitude[here]) ** 2, axis=2), axis=0)
+    f = np.abs(lines.frequency) / (2.0 * np.pi)
+    least = LEAST_SHARE**2 * np.sum(mean)
+    named = [i for i in np.argsort(-mean)[:MOST_NAMED] if mean[i] > least]
+    for i in sorted(named):
+        parts[f"{lines.names[i]}, {f[i]:.5g} Hz"] = LinePower(f[[i]], mean[[i]])
+    others = np.setdiff1d(np.flatnonzero(mean > 0.0), named)
+    if len(others) and np.sum(mean[others]) > least:
+        parts["other lines"] = LinePower(f[others], mean[others])
+    return parts
+
+
+def cumulative_spectrum(title: str, parts: Mapping[str, Power]) -> Figure:
+    """Cumulative power spectrum as RMS, contributors by name, from above and from below.
+
+    Args:
+        title: of the figure.
+        parts: mean square [rad^2] by frequency of each contributor, taken as independent.
+    """
+    figure = new_figure(4.6, title)
+    if not parts or not any(part.total > 0.0 for part in parts.values()):
+        explain(figure.subplots(), "no image motion to show")
+        return figure
+    corners = np.concatenate([part.corners for part in parts.values()])
+    low, high = np.min(corners[corners > 0.0]), 1.6 * np.max(corners)
+    panels = figure.subplots(1, 2, sharey=True)
+    titles = ("from above: RMS of all above a frequency", "from below: RMS of all below it")
+    sums = [cumulative(parts, way, (low / 1.6, high)) for way in ("backward", "forward")]
+    top = ARCSEC * np.sqrt(max(float(np.max(each.whole)) for each in sums))
+    for axes, each, text in zip(panels, sums, titles, strict=True):
+        axes.set_title(text)
+        for i, (name, values) in enumerate(each.parts.items()):
+            look: dict[str, Any] = {
+                "color": COLOURS[i % (len(COLOURS) - 1)],
+                "linestyle": DASHES[i % len(DASHES)],
+            }
+            _curve(axes, each.frequency_hz, values, label=name, **look)
+        _curve(axes, each.frequency_hz, each.whole, color="k", linewidth=2.0, label="all", zorder=1)
+        axes.set(xscale="log", yscale="log", xlim=(low / 1.6, high), xlabel="frequency [Hz]")
+    smallest = min(np.sqrt(part.total) for part in parts.values() if part.total > 0.0)
+    panels[0].set_ylim(0.2 * ARCSEC * smallest, 2.0 * top)
+    panels[0].set_ylabel("image motion, RMS [arcsec]")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    return figure
+
+
+def _curve(axes: Axes, f: np.ndarray, mean_square: np.ndarray, **look: Any) -> None:
+    """Root of a cumulative mean square; rounding below 1e-12 of the whole is nothing."""
+    rounded = np.where(mean_square > 1e-12 * np.max(mean_square), mean_square, 0.0)
+    axes.plot(f, ARCSEC * np.sqrt(rounded), **look)
+
+
+def exposure(verification: Verification) -> Figure:
+    """Each windowed metric against exposure time, with its requirement."""
+    found = [
+        (verdict, curve)
+        for i, verdict in enumerate(verification.verdicts)
+        if (curve := verification.curve(i)) is not None
+    ]
+    title = f"Pointing against exposure time ({verification.scenario.name}, "
+    title += f"{verification.run.attrs['mount']})"
+    if not found:
+        figure = new_figure(2.6, title)
+        explain(figure.subplots(), "no requirement on a metric with an exposure window")
+        return figure
+    rows = (len(found) + 1) // 2
+    figure = new_figure(0.6 + 2.7 * rows, title)
+    panels = figure.subplots(rows, min(2, len(found)), squeeze=False).ravel()
+    for axes, (verdict, curve) in zip(panels, found, strict=False):
+        _exposure(axes, verdict, *curve)
+    for axes in panels[len(found) :]:
+        axes.set_visible(False)
+    share_legend(figure, panels[0])
+    return figure
+
+
+def _exposure(axes: Axes, verdict: Verdict, windows: np.ndarray, values: np.ndarray) -> None:
+    """One metric: the curve, the limit at the required window, and where that window lies."""
+    metric, scale = verdict.metric, 1e3
+    axes.plot(scale * windows, verdict.scale * values, color=COLOURS[0], label="metric")
+    axes.axhline(verdict.shown(verdict.limit), color=COLOURS[1], linestyle=DASHES[1], label="limit")
+    axes.axvline(scale * metric.window, color="0.6", linewidth=0.8, linestyle=DASHES[3])
+    value = verdict.shown(verdict.value)
+    axes.plot(
+        scale * metric.window,
+        value,
+        "o" if verdict.met else "X",
+        color="k",
+        markersize=6,
+        label="at the required exposure: value, met (dot) or not met (cross)",
+    )
+    every = np.array([*(verdict.scale * values), value, verdict.shown(verdict.limit)])
+    log_scale(axes, 0.5 * float(np.min(every[every > 0.0])), 2.0 * float(np.max(every)))
+    axes.set(xscale="log", xlabel="exposure [ms]")
+    unit = "" if verdict.unit == "1" else f" [{verdict.unit}]"
+    axes.set_ylabel(f"{metric.name}{unit or ' [-]'}")
+    word = "met" if verdict.met else "NOT MET"
+    said = f"{verdict.line_of_sight}: {value:.3g}, {word}, margin {verdict.margin_percent:.3g} %"
+    axes.set_title(textwrap.fill(f"{said}; {verdict.meaning}", 46), fontsize=8.5)

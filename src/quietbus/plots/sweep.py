@@ -1,0 +1,253 @@
+"""Pictures of a sweep of the rotors' speed: Campbell diagram, waterfall, amplitude by speed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.colors import LogNorm
+from matplotlib.ticker import FuncFormatter
+
+from quietbus.plots.signals import AXES, LINES, NOISE
+from quietbus.plots.style import COLOURS, DASHES, explain, new_figure, scaled, share_legend, style
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from quietbus.analysis.sweep import SpeedSweep
+
+RPM = 30.0 / np.pi
+HERTZ = 0.5 / np.pi
+WIDE = 10.0  # times the slowest mode: a frequency axis longer than this is logarithmic
+DECADES = 5.0  # of amplitude that colours tell apart
+NO_JITTER = f"no jitter: the rotors shake the bus by less than {NOISE:g} deg/s at every speed"
+
+
+def sweep_figures(sweep: SpeedSweep, name: str) -> dict[str, Figure]:
+    """All pictures of a sweep by name.
+
+    Args:
+        name: of the scenario.
+    """
+    with style():
+        return {
+            "campbell": campbell(sweep, name),
+            "waterfall": waterfall(sweep, name),
+            "speeds": speeds(sweep, name),
+        }
+
+
+def campbell(sweep: SpeedSweep, name: str) -> Figure:
+    """Modes of the satellite on its platform over rotor speed, the orders' rays, and crossings."""
+    figure = new_figure(5.2, f"Modes over rotor speed, gimbals held ({name})")
+    axes = figure.subplots()
+    shown = sweep.factor > 0.0
+    rpm = RPM * sweep.speed[shown]
+    frequency = _mode_frequencies(sweep)[shown]
+    names = sweep.modes["isolated"].modes(0.0)
+    drawn = [k for k in range(frequency.shape[1]) if _elastic(frequency[:, k])]
+    for i, k in enumerate(drawn):
+        mode = names[k]
+        axes.plot(
+            rpm,
+            np.where(frequency[:, k] > 0.0, frequency[:, k], np.nan),
+            color=COLOURS[i % len(COLOURS)],
+            linestyle=DASHES[i // len(COLOURS) % len(DASHES)],
+            label="decaying" if mode is None else f"{mode.name} (damping {mode.damping:.2g})",
+        )
+    excited = sweep.excited("isolated")
+    for order, speed in _rays(sweep):
+        look = "-" if excited[sweep.orders.index(order)] else ":"
+        axes.plot(rpm, HERTZ * order * speed * sweep.factor[shown], look, color="0.45", linewidth=1)
+    for filled, label in ((True, "critical speed"), (False, "crossing, order not excited")):
+        found = [
+            c
+            for c in sweep.critical["isolated"]
+            if bool(excited[sweep.orders.index(c.order)]) == filled
+        ]
+        if found:
+            axes.plot(
+                [RPM * c.factor * np.max(np.abs(sweep.rotor_speed)) for c in found],
+                [c.mode.damped_frequency_hz for c in found],
+                "ko",
+                fillstyle="full" if filled else "none",
+                markersize=5,
+                label=label,
+            )
+    _scale(axes, sweep, frequency[:, drawn], "rotor speed [rpm]", "damped frequency [Hz]", True)
+    _name_rays(axes, sweep)
+    _mark_own_speed(sweep, axes.axvline)
+    legend = axes.get_legend_handles_labels()
+    title = "modes, named as they are with the rotors still"
+    figure.legend(*legend, loc="outside lower center", ncols=2, title=title, title_fontsize=8)
+    return figure
+
+
+def waterfall(sweep: SpeedSweep, name: str) -> Figure:
+    """Amplitude of every line by frequency and speed, on both mounts, with the modes."""
+    figure = new_figure(7.4, f"Bus rate by frequency and rotor speed ({name})")
+    sizes = {mount: np.rad2deg(sweep.by_order(mount)) for mount in LINES}
+    highest = max(float(size.max(initial=0.0)) for size in sizes.values())
+    if highest < NOISE:
+        explain(figure.subplots(), NO_JITTER)
+        return figure
+    panels = figure.subplots(3, 2, sharex=True, sharey=True)
+    norm = LogNorm(highest * 10.0**-DECADES, highest)
+    shown = sweep.factor > 0.0
+    rpm = RPM * sweep.speed[shown]
+    modes = _mode_frequencies(sweep)[shown]
+    drawn = [k for k in range(modes.shape[1]) if _elastic(modes[:, k])]
+    lines = None
+    for column, (mount, (title, _)) in enumerate(LINES.items()):
+        panels[0, column].set_title(title)
+        excited = sweep.excited(mount)
+        for i, axes in enumerate(panels[:, column]):
+            if mount == "isolated":
+                for k in drawn:
+                    shape = np.where(modes[:, k] > 0.0, modes[:, k], np.nan)
+                    axes.plot(
+                        shape,
+                        rpm,
+                        color="0.35",
+                        linewidth=0.7,
+                        label="mode" if k == drawn[0] else None,
+                    )
+            for order, speed in _rays(sweep):
+                o = sweep.orders.index(order)
+                if not excited[o]:
+                    continue
+                rotors = np.isclose(np.abs(sweep.rotor_speed), speed)
+                size = np.rad2deg(np.abs(sweep.bus_rate[mount][:, rotors, o, i])).sum(axis=1)
+                lines = _coloured(
+                    axes, HERTZ * order * speed * sweep.factor[shown], rpm, size[shown], norm
+                )
+            _scale(axes, sweep, modes[:, drawn], "frequency [Hz]" if i == 2 else "", "", False)
+            _mark_own_speed(sweep, axes.axhline)
+            axes.set_ylabel(f"about {AXES[i]}\nrotor speed [rpm]" if column == 0 else "")
+    if lines is not None:
+        bar = figure.colorbar(lines, ax=panels, extend="min", aspect=45)
+        bar.set_label("sum of the rotors' amplitudes [deg/s]")
+        bar.ax.grid(visible=False)
+    share_legend(figure, panels[0, 1])
+    return figure
+
+
+def speeds(sweep: SpeedSweep, name: str) -> Figure:
+    """Amplitude of every order over rotor speed, on both mounts."""
+    figure = new_figure(6.0, f"Bus rate over rotor speed ({name})")
+    sizes = {mount: np.rad2deg(sweep.by_order(mount)) for mount in LINES}
+    highest = max(float(size.max(initial=0.0)) for size in sizes.values())
+    if highest < NOISE:
+        explain(figure.subplots(), NO_JITTER)
+        return figure
+    panels = figure.subplots(3, 1, sharex=True, sharey=True)
+    factor, unit = scaled(highest, "deg/s")
+    shown = sweep.factor > 0.0
+    for i, axes in enumerate(panels):
+        for mount, (label, look) in LINES.items():
+            for o in np.flatnonzero(sweep.excited(mount)):
+                axes.loglog(
+                    RPM * sweep.speed[shown],
+                    factor * sizes[mount][shown, o, i],
+                    color=look["color"],
+                    linestyle=DASHES[o % len(DASHES)],
+                    label=f"order {sweep.orders[o]:g}, {label}",
+                )
+        for c in sweep.critical["isolated"]:
+            if sweep.excited("isolated")[sweep.orders.index(c.order)]:
+                at = RPM * c.factor * np.max(np.abs(sweep.rotor_speed))
+                axes.axvline(at, color="0.7", linewidth=0.8, zorder=0)
+        axes.set_ylim(factor * highest * 10.0**-DECADES, 2.0 * factor * highest)
+        axes.set_ylabel(f"about {AXES[i]}\n[{unit}]")
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        _mark_own_speed(sweep, axes.axvline)
+    least = np.concatenate([factor * size[shown].min(axis=(1, 2)) for size in sizes.values()])
+    start = RPM * sweep.speed[shown][0]
+    if np.any(least > 0.0):
+        panels[0].set_xlim(max(start, 1e-3 * RPM * sweep.speed[-1]), RPM * sweep.speed[-1])
+    panels[0].set_title("sum of the rotors' amplitudes; grey: critical speeds on the platform")
+    panels[-1].set_xlabel("rotor speed [rpm]")
+    share_legend(figure, panels[0])
+    return figure
+
+
+def _mode_frequencies(sweep: SpeedSweep) -> np.ndarray:
+    """Damped frequencies (speed, mode) [Hz] on the platform."""
+    modes = sweep.modes["isolated"]
+    return HERTZ * np.array([modes.frequencies(factor) for factor in sweep.factor])
+
+
+def _elastic(frequency: np.ndarray) -> bool:
+    """A mode of the platform: not a rigid body's, which is still at rest and slow at speed."""
+    return bool(frequency[0] > 0.0 and frequency.max() > 1e-2 * frequency[-1])
+
+
+def _rays(sweep: SpeedSweep) -> list[tuple[float, float]]:
+    """Order and rotor speed [rad/s] at factor 1 of every ray."""
+    distinct = np.unique(np.round(np.abs(sweep.rotor_speed), 9))
+    return [(order, float(speed)) for speed in distinct if speed > 0.0 for order in sweep.orders]
+
+
+def _coloured(axes: Axes, x: np.ndarray, y: np.ndarray, size: np.ndarray, norm: LogNorm):
+    """A line whose colour is the size."""
+    points = np.stack([x, y], axis=1)
+    middle = 0.5 * (size[1:] + size[:-1])
+    lines = LineCollection(
+        np.stack([points[:-1], points[1:]], axis=1),  # type: ignore[arg-type]
+        cmap="viridis",
+        norm=norm,
+        linewidths=4.0,
+        capstyle="round",
+    )
+    lines.set_array(np.maximum(middle, norm.vmin or 0.0))
+    axes.add_collection(lines)
+    return lines
+
+
+def _scale(
+    axes: Axes, sweep: SpeedSweep, modes: np.ndarray, x: str, y: str, speed_along_x: bool
+) -> None:
+    """Limits and labels; logarithmic where the modes are far below the orders."""
+    most = RPM * sweep.speed[-1]
+    highest = HERTZ * float(sweep.frequency.max())
+    oscillating = modes[modes > 0.0]
+    slowest = float(oscillating.min(initial=highest))
+    limits = {"speed": (0.0, most), "frequency": (0.0, highest)}
+    if highest > WIDE * slowest:
+        low = 0.3 * slowest
+        limits = {"speed": (most * low / highest, most), "frequency": (low, highest)}
+        axes.set(xscale="log", yscale="log")
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    names = ("speed", "frequency") if speed_along_x else ("frequency", "speed")
+    axes.set(xlabel=x, ylabel=y, xlim=limits[names[0]], ylim=limits[names[1]])
+
+
+def _name_rays(axes: Axes, sweep: SpeedSweep) -> None:
+    """The order on each ray, where the rays are far apart."""
+    low, most = axes.get_xlim()
+    bottom, highest = axes.get_ylim()
+    fastest = np.max(np.abs(sweep.rotor_speed))
+    for order, speed in _rays(sweep):
+        slope = HERTZ * order * speed / (RPM * fastest)  # [Hz/rpm]
+        end = min(most, highest / slope)
+        start = max(low, bottom / slope)
+        at = start**0.25 * end**0.75 if low > 0.0 else 0.8 * end
+        axes.annotate(
+            f"{order:g}Ω",
+            (at, slope * at),
+            ha="center",
+            va="center",
+            fontsize=8,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
+        )
+
+
+def _mark_own_speed(sweep: SpeedSweep, line: Callable[..., object]) -> None:
+    own = RPM * float(np.max(np.abs(sweep.rotor_speed)))
+    if own <= RPM * sweep.speed[-1] * (1.0 + 1e-9):
+        line(own, color="0.2", linewidth=0.8, linestyle=DASHES[3], label="the rotors' own speed")

@@ -1,0 +1,287 @@
+"""Measured disturbances of rotors and of gimbal motors: orders, resonances, spectra, ripple."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, Discriminator, Tag, ValidationInfo, model_validator
+
+from quietbus.scenario.base import (
+    Angle,
+    Frequency,
+    Part,
+    PositiveAngularVelocity,
+    PositiveNumber,
+    Series,
+    Text,
+    UnitCount,
+    listing,
+)
+from quietbus.scenario.errors import Findings, ScenarioError
+from quietbus.scenario.units import Quantity, expected
+from quietbus.scenario.wheel_files import read_wheel_table
+
+COMPONENTS = ("radial_force", "axial_force", "radial_torque", "axial_torque")
+
+ForceCoefficient = Annotated[
+    float, Quantity("a force coefficient, force over speed squared,", "kg*m", least=0.0)
+]
+TorqueCoefficient = Annotated[
+    float, Quantity("a torque coefficient, torque over speed squared,", "kg*m^2", least=0.0)
+]
+# per Hz, never per rad/s: radians are not ignored here
+ForceDensity = Annotated[
+    float, Quantity("a one-sided force spectrum", "N^2/Hz", least=0.0, exact=True)
+]
+TorqueDensity = Annotated[
+    float, Quantity("a one-sided torque spectrum", "N^2*m^2/Hz", least=0.0, exact=True)
+]
+RippleTorque = Annotated[float, Quantity("a torque", "N*m", least=0.0)]
+
+
+def _seed(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+        raise expected("a whole number of at least 0", value)
+    return value
+
+
+def _phase_form(value: Any) -> str:
+    if isinstance(value, dict | Part):
+        return "<each>"
+    return "<random>" if value == "random" else "<angle>"
+
+
+PhaseAngle = Annotated[float, Quantity("random, or an angle", "rad")]
+Phase = Annotated[
+    Annotated[PhaseAngle, Tag("<angle>")] | Annotated[Literal["random"], Tag("<random>")],
+    Discriminator(_phase_form),
+]
+
+
+class Phases(Part):
+    """A phase for each component."""
+
+    radial_force: Phase = 0.0
+    axial_force: Phase = 0.0
+    radial_torque: Phase = 0.0
+    axial_torque: Phase = 0.0
+
+
+class Order(Part):
+    """One line of a harmonic table: amplitudes are coefficients times rotor speed squared."""
+
+    order: PositiveNumber  # multiple of rotor speed
+    radial_force: ForceCoefficient = 0.0  # turns across the spin axis
+    axial_force: ForceCoefficient = 0.0  # along the spin axis
+    radial_torque: TorqueCoefficient = 0.0
+    axial_torque: TorqueCoefficient = 0.0
+    whirl: Literal["forward", "backward"] = "forward"  # sense in which the radial ones turn
+    phase: Annotated[
+        Annotated[PhaseAngle, Tag("<angle>")]
+        | Annotated[Literal["random"], Tag("<random>")]
+        | Annotated[Phases, Tag("<each>")],
+        Discriminator(_phase_form),
+    ] = 0.0
+
+    @property
+    def acts(self) -> bool:
+        """Whether any coefficient is not zero."""
+        return any(getattr(self, component) > 0.0 for component in COMPONENTS)
+
+    def phase_of(self, component: str) -> float | Literal["random"]:
+        """Phase [rad] of one of ``COMPONENTS``, against order times rotor angle."""
+        if isinstance(self.phase, Phases):
+            phase: float | Literal["random"] = getattr(self.phase, component)
+            return phase
+        return self.phase
+
+
+class Resonance(Part):
+    """A mode of the rotor on its bearings, the gimbal held."""
+
+    frequency: Frequency
+    damping: PositiveNumber  # over critical damping
+
+
+class Resonances(Part):
+    """Modes of the rotor on its bearings; a missing one is stiff."""
+
+    radial: Resonance | None = None  # translation across the spin axis
+    axial: Resonance | None = None  # translation along the spin axis
+    rocking: Resonance | None = None  # tilt of the spin axis; frequency at standstill
+
+
+class _Spectrum(Part):
+    """A one-sided power spectral density over frequency; nothing outside the table."""
+
+    frequency: Series[Frequency]
+    psd: Any
+    interpolation: Literal["log", "linear"] = "log"  # log: straight on double-logarithmic paper
+    sample_rate: Frequency | None = None  # of the measurement: frequencies end at its half
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        findings = Findings()
+        if len(self.psd) != len(self.frequency):
+            findings.add(
+                "psd",
+                f"expected {len(self.frequency)} numbers, one for each frequency, "
+                f"got {len(self.psd)}",
+            )
+        if len(self.frequency) < 2:
+            findings.add("frequency", "expected at least two frequencies, a band, got one")
+        for i in range(1, len(self.frequency)):
+            if self.frequency[i] <= self.frequency[i - 1]:
+                findings.add(
+                    ("frequency", i),
+                    f"expected a frequency above {self.frequency[i - 1]:g} Hz, the one before, "
+                    f"got {self.frequency[i]:g}",
+                )
+        if self.sample_rate is not None:
+            for i, frequency in enumerate(self.frequency):
+                if frequency > 0.5 * self.sample_rate:
+                    findings.add(
+                        ("frequency", i),
+                        f"expected at most {0.5 * self.sample_rate:g} Hz, the Nyquist frequency "
+                        f"of the table's sample_rate, got {frequency:g}",
+                    )
+        if self.interpolation == "log":
+            for i, value in enumerate(self.psd):
+                if value <= 0.0:
+                    findings.add(
+                        ("psd", i),
+                        f"expected a number above 0 for interpolation log, got {value:g}; "
+                        "interpolation linear takes zeros",
+                    )
+        findings.raise_any()
+        return self
+
+
+class ForceSpectrum(_Spectrum):
+    """Force along each axis it acts on."""
+
+    psd: Series[ForceDensity]
+
+
+class TorqueSpectrum(_Spectrum):
+    """Torque about each axis it acts on."""
+
+    psd: Series[TorqueDensity]
+
+
+class Broadband(Part):
+    """Noise of the rotor's bearings; a radial one acts along both axes across the spin axis."""
+
+    radial_force: ForceSpectrum | None = None
+    axial_force: ForceSpectrum | None = None
+    radial_torque: TorqueSpectrum | None = None
+    axial_torque: TorqueSpectrum | None = None
+
+    def given(self) -> dict[str, ForceSpectrum | TorqueSpectrum]:
+        """The spectra that there are, by component."""
+        spectra = {name: getattr(self, name) for name in COMPONENTS}
+        return {name: spectrum for name, spectrum in spectra.items() if spectrum is not None}
+
+
+class Disturbance(Part):
+    """What a rotor does to its gimbal beyond the imbalance of a rigid body."""
+
+    table: Text | None = None  # file with the orders, read when the scenario is
+    orders: Annotated[tuple[Order, ...], listing(None, "orders")] | None = None
+    resonances: Resonances = Resonances()
+    broadband: Broadband = Broadband()
+    seed: Annotated[int, BeforeValidator(_seed)] = 0  # of random phases and of the noise
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_table(cls, data: Any, info: ValidationInfo) -> Any:
+        """Put the orders and resonances of the file in the place of its name.
+
+        A relative path starts at the folder of the scenario's file.
+        """
+        if not isinstance(data, dict) or data.get("table") is None:
+            return data
+        findings = Findings()
+        name = data["table"]
+        if not isinstance(name, str) or not name:
+            raise expected("the name of a file", name)
+        if data.get("orders") is not None:
+            findings.add("table", "expected either table or orders, got both")
+        findings.raise_any()
+        folder = Path((info.context or {}).get("folder", "."))
+        try:
+            table = read_wheel_table(folder / name)
+        except ScenarioError as error:
+            for problem in error.problems:
+                findings.add("table", f"{error.source}: {problem}")
+            findings.raise_any()
+            raise
+        for lost in table.lost:
+            findings.add("table", f"{table.source}: cannot be taken over: {lost}")
+        findings.raise_any()
+        return table.to_dict() | {key: value for key, value in data.items() if key != "table"}
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        findings = Findings()
+        orders = self.orders or ()
+        for i in range(1, len(orders)):
+            before, this = ((o.order, o.whirl == "backward") for o in orders[i - 1 : i + 1])
+            if this <= before:
+                findings.add(
+                    ("orders", i, "order"),
+                    f"expected an order above {before[0]:g}, the one before, got {this[0]:g}",
+                )
+        if not orders and not self.broadband.given() and self.resonances != Resonances():
+            findings.add(
+                "resonances",
+                "expected orders or broadband beside them: resonances amplify these alone, "
+                "not the imbalance of the rigid rotor",
+            )
+        findings.raise_any()
+        return self
+
+
+class Ripple(Part):
+    """Torque of a gimbal motor that repeats over a turn of the gimbal."""
+
+    per_turn: UnitCount
+    torque: RippleTorque  # amplitude
+    phase: Angle = 0.0  # against per_turn times gimbal angle
+
+
+class Stepping(Part):
+    """A motor that turns the gimbal in steps, which the gimbal follows as an oscillator."""
+
+    steps_per_turn: UnitCount  # of the gimbal, gear included
+    frequency: Frequency  # of the oscillation about a step
+    damping: PositiveNumber  # over critical damping
+    harmonics: UnitCount = 5  # of the stepping frequency that are taken along
+
+
+class GimbalMotor(Part):
+    """What the gimbal motors do beyond following their command."""
+
+    ripple: Annotated[tuple[Ripple, ...], listing(None, "ripples")] | None = None
+    stepping: Stepping | None = None
+    # [rad/s] ripple slower than this is held by the motor; None: a tenth of the servo's bandwidth
+    holding_bandwidth: PositiveAngularVelocity | None = None
+
+    @property
+    def lines(self) -> tuple[int, ...]:
+        """Multiples of the gimbal angle: those of ripple, then those of steps."""
+        steps = self.stepping
+        harmonics = range(1, steps.harmonics + 1) if steps else ()
+        return (
+            *(ripple.per_turn for ripple in self.ripple or ()),
+            *(k * steps.steps_per_turn for k in harmonics if steps),
+        )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        findings = Findings()
+        if self.ripple is None and self.stepping is None:
+            findings.add((), "expected ripple, stepping or both, got neither")
+        findings.raise_any()
+        return self

@@ -1,0 +1,236 @@
+"""Measured maps from files: layouts, units, what is wrong; the commands `import` and `fit`."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import quietbus as qb
+from oracles.wheels import measured as spectra
+from quietbus import cli
+from quietbus.measured import MapError, WaterfallFit, noise_bandwidth
+from quietbus.scenario.text import read_yaml
+
+RPM = 2 * np.pi / 60
+MATRIX = """# component: radial_force
+# unit: mN^2/Hz
+# speed_unit: rpm
+# window: hann
+# sample_rate: 200 Hz
+speed \\ frequency, 10, 20, 30, 40
+600, 1, 2, 3, 4
+1200, 5, 6, 7, 8
+1800, 9, 10, 11, 12
+"""
+LONG = """# unit: N*m
+# speed_unit: rev/s
+component,speed,frequency,value
+""" + "\n".join(f"radial_torque,{s},{f},{0.1 * s + f}" for f in (5, 10, 15) for s in (3, 1, 2))
+TURNS = np.linspace(8.0, 100.0, 40)
+LINES = ((1.0, 7.5e-8, 1), (2.0, 1.2e-8, 1), (3.87, 9e-9, 1))
+
+
+@pytest.fixture
+def put(tmp_path):
+    def write(text, name="map.csv"):
+        file = tmp_path / name
+        file.write_text(text)
+        return file
+
+    return write
+
+
+def netcdf(path, psd, frequency, name="radial_force", speed_unit="rpm", **attributes):
+    about = {"units": "N^2/Hz", "window": "hann"} | attributes
+    xr.Dataset(
+        {name: (("speed", "frequency"), psd, about)},
+        {
+            "speed": ("speed", 60 * TURNS[: len(psd)], {"units": speed_unit}),
+            "frequency": ("frequency", frequency, {"units": "Hz"}),
+        },
+    ).to_netcdf(path, engine="h5netcdf")
+    return path
+
+
+def test_a_matrix_in_csv(put):
+    found = qb.read_waterfall(put(MATRIX))["radial_force"]
+    assert found.to_numpy() == pytest.approx(1e-6 * np.arange(1.0, 13.0).reshape(3, 4))
+    assert found["speed"].to_numpy() == pytest.approx(RPM * np.array([600, 1200, 1800]))
+    assert found["frequency"].to_numpy().tolist() == [10, 20, 30, 40]
+    assert found.attrs["window"] == "hann"
+    assert found.attrs["units"] == "N^2/Hz"
+
+
+def test_long_rows_of_amplitudes_become_power_spectral_densities(put):
+    """A line of amplitude A reads A: its PSD is A^2 / 2 over the noise bandwidth."""
+    found = qb.read_waterfall(put(LONG))["radial_torque"]
+    s, f = np.array([1.0, 2.0, 3.0]), np.array([5.0, 10.0, 15.0])
+    amplitude = 0.1 * s[:, None] + f
+    assert found["speed"].to_numpy() == pytest.approx(2 * np.pi * s)
+    assert found.to_numpy() == pytest.approx(0.5 * amplitude**2 / (1.5 * 5.0))
+    assert noise_bandwidth("hann") == pytest.approx(1.5)
+    assert noise_bandwidth("flattop") == pytest.approx(3.77, abs=0.01)
+
+
+def test_netcdf_is_read_with_its_units(tmp_path):
+    psd = np.arange(12.0).reshape(3, 4) + 1
+    file = netcdf(tmp_path / "map.nc", psd, [0.0, 1.0, 2.0, 3.0], sample_rate="10 Hz")
+    found = qb.read_waterfall(file)["radial_force"]
+    assert found.to_numpy() == pytest.approx(psd)
+    assert found["speed"].to_numpy() == pytest.approx(2 * np.pi * TURNS[:3])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("# component: radial_force", "", "component: expected one of radial_force"),
+        ("mN^2/Hz", "kg", r"unit: .*in N\^2/Hz or an amplitude in N, got 'kg'"),
+        ("mN^2/Hz", "N^2*s/rad", "unit: expected a power spectral density"),
+        ("# speed_unit: rpm", "", "speed_unit: expected a unit, such as rad/s, got none"),
+        ("speed_unit: rpm", "speed_unit: Hz", "turns or radians"),
+        ("window: hann", "window: boxcar", "window: expected one of none, hann"),
+        ("sample_rate: 200", "sample_rate: 60", "at most 30 Hz, the Nyquist .*, got 40"),
+        ("1200, 5", "400, 5", "speed: expected ascending values, got 400 after 600"),
+        ("600, 1", "0, 1", "speed: expected numbers above 0, got 0"),
+        ("10, 20, 30", "10, 30, 20", "frequency: expected ascending values, got 20 after 30"),
+        ("30, 40", "30, 50", "evenly spaced"),
+        ("5, 6, 7", "5, -6, 7", "numbers of at least 0, got -6 at speed 1200 and frequency 20"),
+        ("5, 6, 7", "5, 7", r"line 8: expected 5 cells, got 4"),
+        ("5, 6, 7", "5, x, 7", r"column 3 \(line 8\): expected a number, got 'x'"),
+        ("1800, 9, 10, 11, 12\n", "", "speed: expected at least three, got 2"),
+    ],
+)
+def test_a_wrong_matrix_is_told(put, old, new, message):
+    assert MATRIX.count(old) == 1
+    with pytest.raises(MapError, match=message):
+        qb.read_waterfall(put(MATRIX.replace(old, new)))
+
+
+def test_other_wrong_files_are_told(put, tmp_path):
+    with pytest.raises(MapError, match="no such file"):
+        qb.read_waterfall(tmp_path / "nowhere.csv")
+    with pytest.raises(MapError, match="got no map"):
+        qb.read_waterfall(put(""))
+    with pytest.raises(MapError, match="every speed with every frequency; 1 are missing"):
+        qb.read_waterfall(put(LONG.rpartition("\n")[0]))
+    with pytest.raises(MapError, match="stand here twice"):
+        qb.read_waterfall(put(LONG + "\nradial_torque,1,5,3"))
+    with pytest.raises(MapError, match="unknown column 'amount'"):
+        qb.read_waterfall(put(LONG.replace("value", "amount")))
+    wrong = netcdf(tmp_path / "a.nc", np.ones((3, 4)), np.arange(4.0), name="thrust")
+    with pytest.raises(MapError, match=r"expected variables among radial_force.*got thrust"):
+        qb.read_waterfall(wrong)
+    wrong = netcdf(tmp_path / "b.nc", np.ones((3, 4)), np.arange(4.0), units="N*m")
+    with pytest.raises(MapError, match="or an amplitude in N, got"):
+        qb.read_waterfall(wrong)
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    frequency, psd = spectra(LINES, (230.0, 0.02, 0.0), TURNS, 1e-9, seconds=16.0)
+    return netcdf(tmp_path_factory.mktemp("maps") / "wheel.nc", psd, frequency)
+
+
+@pytest.fixture(scope="module")
+def fitted(file):
+    return qb.fit_waterfall(file)
+
+
+def test_a_fit_is_a_disturbance_that_a_scenario_takes(fitted):
+    block, _ = read_yaml(fitted.to_yaml(), "fit")
+    zhang = qb.load_scenario("zhang2012").to_dict()
+    zhang["cluster"]["rotor"] |= block
+    found = qb.Scenario.from_dict(zhang).cluster.rotor.disturbance
+    assert [line.order for line in found.orders] == pytest.approx([1.0, 2.0, 3.87], rel=1e-4)
+    assert found.orders[0].order == 1.0  # whole to the last digit: it adds to the imbalance's
+    for line, (_, coefficient, _) in zip(found.orders, LINES, strict=True):
+        assert line.radial_force == pytest.approx(coefficient, rel=0.01)
+    assert found.resonances.radial.frequency == pytest.approx(230.0, rel=0.01)
+    assert set(found.broadband.given()) == {"radial_force"}
+
+
+def test_a_floor_that_the_mode_does_not_shape_comes_back_at_the_mount(fitted):
+    """The scenario's noise arises at the rotor; through the mode its mean level is the map's."""
+    each = fitted.components["radial_force"]
+    assert not each.floor_at_rotor
+    f = each.floor_frequency
+    d = 2j * 0.02 * f / 230.0
+    passed = np.abs((1 + d) / (1 + d - (f / 230.0) ** 2)) ** 2
+    assert each.rotor_floor * passed == pytest.approx(each.floor, rel=0.05)
+
+
+def test_orders_of_components_are_one_where_they_agree(fitted):
+    force = fitted.components["radial_force"]
+    both = WaterfallFit({"radial_force": force, "axial_force": force}).disturbance()
+    assert len(both["orders"]) == 3
+    assert all(o["radial_force"] == o["axial_force"] for o in both["orders"])
+
+
+def test_maps_of_a_fit_are_labelled(fitted):
+    maps = fitted.to_dataset()
+    ratio = maps["radial_force_measured"] / maps["radial_force_fitted"]
+    assert maps["radial_force_residual"].to_numpy() == pytest.approx(
+        10 * np.log10(ratio.to_numpy())
+    )
+    assert maps["radial_force_measured"].attrs["units"] == "N^2/Hz"
+
+
+def run(*arguments, capsys):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["quietbus", *map(str, arguments)])
+        with pytest.raises(SystemExit) as stopped:
+            cli.main()
+    captured = capsys.readouterr()
+    return stopped.value.code or 0, captured.out, captured.err
+
+
+def test_command_fit_writes_numbers_pictures_and_the_block(file, fitted, tmp_path, capsys):
+    code, out, _ = run("fit", file, "-o", tmp_path, capsys=capsys)
+    assert code == 0
+    assert "Orders of the radial force" in out
+    assert "230 Hz" in out
+    assert (tmp_path / "disturbance.yaml").read_text() == fitted.to_yaml()
+    for name in ("waterfall", "lines"):
+        assert (tmp_path / f"{name}-radial_force.png").stat().st_size > 10_000
+    code, out, err = run("fit", file, "--json", capsys=capsys)
+    assert (code, err) == (0, "")
+    assert json.loads(out) == json.loads((tmp_path / "fit.json").read_text())
+    order = json.loads(out)["components"]["radial_force"]["orders"][0]["order"]
+    assert order["value"] == pytest.approx(1.0, abs=5 * order["deviation"])
+
+
+def test_command_import_prints_or_writes_the_block(put, tmp_path, capsys):
+    table = put("1.0,9e-8\n2.5,1e-9\n", "radial_force.csv")
+    code, out, err = run("import", table, capsys=capsys)
+    assert (code, err) == (0, "")
+    block, _ = read_yaml(out, "import")
+    assert block == {"disturbance": qb.read_wheel_table(table).to_dict()}
+    code, out, _ = run("import", table, "-o", tmp_path / "d.yaml", capsys=capsys)
+    assert code == 0
+    assert read_yaml((tmp_path / "d.yaml").read_text(), "import")[0] == block
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("import", "nowhere.csv"), "nowhere.csv: no such file"),
+        (("import", "nowhere.csv", "--kind", "radial"), "--kind: expected one of radial_force"),
+        (("fit", "nowhere.nc"), "nowhere.nc: no such file"),
+    ],
+)
+def test_wrong_input_is_one_message(arguments, message, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run(*arguments, capsys=capsys)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert "Traceback" not in err
+
+
+def test_a_map_without_lines_is_bad_input(tmp_path, capsys):
+    frequency, psd = spectra((), None, TURNS[:12], 1e-9, seconds=8.0)
+    file = netcdf(tmp_path / "noise.nc", psd, frequency)
+    code, _, err = run("fit", file, "-o", tmp_path / "out", capsys=capsys)
+    assert code == 2
+    assert "radial_force: no order stands out" in err
