@@ -43,7 +43,7 @@ def test_wrench_on_the_plate_is_that_of_vectors_turned_by_hand():
 
     @jax.jit
     def push(gamma, phi):
-        each = shaking.wrench(cluster, jnp.zeros(()), phi)
+        each = shaking.wrench(cluster, jnp.zeros(()), phi, cluster.rotor_speed)
         return on_plate(cluster, gamma, each[:, None])[:, 0]
 
     found = np.asarray(push(gamma, phi))
@@ -207,4 +207,5 @@ def test_noise_without_a_realisation_is_refused():
     table = Spectrum(jnp.array([5.0, 50.0]), jnp.array([2.0, 0.5]), False)
     noisy = disturbance(broadband=((table, None, None, None),) * 4)
     with pytest.raises(ValueError, match="needs a realisation"):
-        noisy.wrench(paper_satellite().cluster, jnp.zeros(()), jnp.zeros(4))
+        cluster = paper_satellite().cluster
+        noisy.wrench(cluster, jnp.zeros(()), jnp.zeros(4), cluster.rotor_speed)
