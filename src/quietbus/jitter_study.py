@@ -26,7 +26,13 @@ from quietbus.analysis.jitter import (
     steady_jitter,
     worst_angles,
 )
-from quietbus.analysis.sweep import SpeedSweep, SpinningModes, critical_speeds
+from quietbus.analysis.sweep import (
+    SpeedSweep,
+    SpinningModes,
+    bearing_critical_speeds,
+    bearing_modes,
+    critical_speeds,
+)
 from quietbus.build import build_satellite
 from quietbus.dynamics.vibration import NOTHING_SEEN, Vibration
 from quietbus.model.satellite import Satellite
@@ -196,7 +202,9 @@ class JitterStudy:
             ends = np.array([0.0, 0.5 * most, most])
             modes[mount] = SpinningModes.between(self._at_speeds(mount, ends)[1], ends)
             critical[mount] = critical_speeds(modes[mount], own, self.orders, most)
-        crossed = [found.factor for each in critical.values() for found in each]
+        own_rotors = self.satellite("isolated")
+        inner = bearing_critical_speeds(own_rotors, self.orders, most)
+        crossed = [found.factor for each in (*critical.values(), inner) for found in each]
         factor = np.unique(np.append(factor, crossed))
         bus_rate = {}
         for mount in MOUNTS:
@@ -204,7 +212,17 @@ class JitterStudy:
             rate[factor == 0.0] = 0.0  # steering by standing rotors has no meaning
             bus_rate[mount] = rate
         phase = np.asarray(self.satellite("isolated").cluster.rotor_phase)
-        return SpeedSweep(factor, own, phase, self.orders, bus_rate, modes, critical)
+        return SpeedSweep(
+            factor,
+            own,
+            phase,
+            self.orders,
+            bus_rate,
+            modes,
+            critical,
+            bearing_modes(own_rotors),
+            inner,
+        )
 
     def _at_speeds(
         self, mount: str, factors: np.ndarray

@@ -344,14 +344,15 @@ def jitter_tables(numbers: Mapping[str, Any]) -> Iterator[Table]:
 
 
 def critical_table(sweep: Mapping[str, Any]) -> Table:
-    """Speeds at which an order that shakes the bus meets a mode, on the platform."""
-    found = sweep["isolated"]["critical_speeds"]
+    """Speeds at which an order that shakes the bus meets a mode of platform or rotor."""
+    found = sweep["isolated"]["critical_speeds"] + sweep["isolated"]["bearing_critical_speeds"]
+    found = sorted(found, key=lambda critical: critical["factor"])
     most = sweep["speed_rpm"][-1]
     table = _titled(f"Critical speeds on the platform, gimbals held, up to {most:.5g} rpm")
     columns = ("speed\nrpm", "order", "frequency\nHz", "damping\n-", "Q\n-", "bus rate\ndeg/s")
     for column in columns:
         table.add_column(column, justify="right")
-    table.add_column("mode of the plate", overflow="fold")
+    table.add_column("mode", overflow="fold")
     shown = [critical for critical in found if critical["excited"]]
     for critical in shown:
         table.add_row(

@@ -7,7 +7,8 @@ import pytest
 
 import quietbus as qb
 from quietbus.analysis.modes import free_modes
-from quietbus.analysis.sweep import SpinningModes, critical_speeds
+from quietbus.analysis.sweep import SpinningModes, bearing_critical_speeds, critical_speeds
+from quietbus.build import build_satellite
 
 SPEED = 2 * np.pi * 100.0
 
@@ -141,6 +142,46 @@ def test_rotors_of_one_speed_add_with_their_phases(turned, sweep):
     for mount in ("isolated", "rigid"):
         together = np.abs(sweep.together(mount)[i]).sum(axis=0)
         assert together == pytest.approx(turned.combined(mount).envelope)
+
+
+def test_lines_of_a_table_meet_the_whirl_that_they_excite():
+    """Rocking of a rotor: w^2 -+ Is/It Omega w = w0^2 (undamped), met at w = h Omega."""
+    scenario = qb.load_scenario("zhang2012")
+    table = {
+        "orders": [
+            {"order": 0.7, "radial_torque": 1e-9, "whirl": "backward"},
+            {"order": 3.0, "radial_torque": 1e-9},
+            {"order": 4.0, "radial_force": 1e-9},
+            {"order": 5.0, "axial_torque": 1e-9},
+        ],
+        "resonances": {
+            "radial": {"frequency": "300 Hz", "damping": 0.02},
+            "rocking": {"frequency": "60 Hz", "damping": 1e-6},
+        },
+    }
+    scenario = scenario.with_overrides({"cluster.rotor.disturbance": table})
+    rotor = scenario.cluster.placed()[0].rotor
+    ratio = rotor.inertia[0, 0] / rotor.inertia[1, 1]
+    satellite = build_satellite(scenario)
+    criticals = bearing_critical_speeds(satellite, scenario.cluster.orders, 1.2)
+    found = {(c.order, c.mode.name): c.speed / (2 * np.pi) for c in criticals}
+    assert found == {
+        (3.0, "rotor, rocking, forward"): pytest.approx(60 / np.sqrt(9 - 3 * ratio), rel=1e-6),
+        (0.7, "rotor, rocking, backward"): pytest.approx(
+            60 / np.sqrt(0.49 + 0.7 * ratio), rel=1e-6
+        ),
+        (4.0, "rotor, radial"): pytest.approx(75 * np.sqrt(1 - 0.02**2), rel=1e-6),
+    }
+    # there the model's own transmission has its peak
+    peaked = next(c for c in criticals if c.order == 3.0)
+    column = scenario.cluster.orders.index(3.0)
+    sizes = []
+    for factor in peaked.factor * np.array([0.999, 1.0, 1.001]):
+        amplitude = satellite.disturbance.amplitudes(
+            satellite.cluster, factor * satellite.cluster.rotor_speed
+        )
+        sizes.append(float(np.abs(amplitude[0, column]).max()))
+    assert sizes[1] > 100 * max(sizes[0], sizes[2])
 
 
 def test_wrong_input_is_refused(turned):

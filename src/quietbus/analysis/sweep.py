@@ -6,7 +6,7 @@ the controlled satellite.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from scipy.optimize import brentq
 
 from quietbus.analysis.modes import Mode, mode_of
 from quietbus.dynamics.vibration import Vibration
+from quietbus.model.satellite import Satellite
 
 SEARCHED_SPEEDS = 400  # where modes are computed to bracket the crossings
 SAME_SPEED = 1e-9  # relative: rotors closer than this turn at one speed
@@ -54,7 +55,8 @@ class SpinningModes:
         G, L = ((matrix[-1] - matrix[0]) / span for matrix in (C, K))
         for matrix, slope in ((M, 0.0 * G), (C, G), (K, L)):
             line = matrix[0] + np.multiply.outer(factor, slope)
-            if np.max(np.abs(matrix - line)) > _PROPORTIONAL * np.max(np.abs(matrix)):
+            size = np.max(np.abs(matrix)) + np.max(np.abs(M))  # K is none on a rigid mount
+            if np.max(np.abs(matrix - line)) > _PROPORTIONAL * size:
                 raise ValueError("the satellite's vibration does not follow the rotors' speed")
         T = small.projection
         shapes = np.eye(12) if T is None else np.asarray(T)[0]
@@ -159,6 +161,74 @@ def _of_one_speed(speed: np.ndarray) -> list[tuple[int, ...]]:
 
 
 @dataclass(frozen=True, eq=False)
+class BearingMode:
+    """A mode of some rotors on their bearings, the gimbal held; rocking splits with speed."""
+
+    name: str  # radial, axial or rocking
+    cmgs: tuple[int, ...]  # rotors that are alike in this
+    vibration: SpinningModes
+
+    def whirl(self, branch: int) -> str:
+        """Its name with the way in which a branch of the frequencies turns."""
+        return f"{self.name}, {('backward', 'forward')[branch]}" if self.splits else self.name
+
+    @property
+    def splits(self) -> bool:
+        """Whether it has two branches."""
+        return len(self.vibration.M) == 2
+
+
+_CHANNELS = {"radial": ((0, 1),), "axial": ((2,),), "rocking": ((4,), (3,))}  # of each branch
+
+
+def bearing_modes(satellite: Satellite) -> tuple[BearingMode, ...]:
+    """Internal modes of the rotors, from the scenario's ``disturbance.resonances``."""
+    disturbance, cluster = satellite.disturbance, satellite.cluster
+    if disturbance is None:
+        return ()
+    period, damping = np.asarray(disturbance.period), np.asarray(disturbance.damping)
+    inertia, speed = np.asarray(cluster.I_RRcm_R), np.asarray(cluster.rotor_speed)
+    alike: dict[tuple[int, float, float, float, float], list[int]] = {}
+    for m, name in enumerate(_CHANNELS):
+        for j in np.flatnonzero(period[:, m] > 0.0):
+            across = 0.5 * (inertia[j, 1, 1] + inertia[j, 2, 2])
+            gyro = inertia[j, 0, 0] / across * abs(speed[j]) if name == "rocking" else 0.0
+            key = (m, 1.0 / period[j, m], damping[j, m], gyro, abs(speed[j]))
+            alike.setdefault(key, []).append(int(j))
+    found = []
+    for (kind, w0, ratio, gyro, _), cmgs in alike.items():
+        name = list(_CHANNELS)[kind]
+        unit = np.eye(2 if name == "rocking" else 1)
+        turning = gyro * np.array([[0.0, 1.0], [-1.0, 0.0]]) if name == "rocking" else 0.0 * unit
+        vibration = SpinningModes(
+            unit, 2.0 * ratio * w0 * unit, turning, w0**2 * unit, 0.0 * unit, np.eye(12, len(unit))
+        )
+        found.append(BearingMode(name, tuple(cmgs), vibration))
+    return tuple(found)
+
+
+def bearing_critical_speeds(
+    satellite: Satellite, orders: Sequence[float], most: float
+) -> tuple[CriticalSpeed, ...]:
+    """Speeds at which a line of a rotor's table meets the mode that it excites."""
+    speed, found = np.asarray(satellite.cluster.rotor_speed), []
+    for bearing in bearing_modes(satellite):
+        assert satellite.disturbance is not None
+        cmgs = list(bearing.cmgs)
+        coefficient = np.asarray(satellite.disturbance.coefficient)[cmgs]  # (cmg, order, channel)
+        for critical in critical_speeds(bearing.vibration, speed[cmgs[:1]], orders, most):
+            frequency = bearing.vibration.frequencies(critical.factor)
+            branch = int(np.argmin(np.abs(frequency - critical.order * critical.speed)))
+            channels = list(_CHANNELS[bearing.name][branch])
+            if coefficient[:, list(orders).index(critical.order), channels].any():
+                mode = replace(
+                    critical.mode, name=f"rotor, {bearing.whirl(branch)}", shape=np.zeros(12)
+                )
+                found.append(replace(critical, cmgs=bearing.cmgs, mode=mode))
+    return tuple(sorted(found, key=lambda critical: critical.factor))
+
+
+@dataclass(frozen=True, eq=False)
 class SpeedSweep:
     """Jitter and modes of a satellite at rest, over the speed of its rotors.
 
@@ -172,6 +242,8 @@ class SpeedSweep:
     bus_rate: dict[str, np.ndarray]  # by mount: (n, cmg, order, axis) complex [rad/s]
     modes: dict[str, SpinningModes]  # by mount
     critical: dict[str, tuple[CriticalSpeed, ...]]  # by mount
+    bearings: tuple[BearingMode, ...] = ()  # of rotors with internal modes
+    bearing_critical: tuple[CriticalSpeed, ...] = ()
 
     @property
     def speed(self) -> np.ndarray:
@@ -225,23 +297,26 @@ class SpeedSweep:
                         np.moveaxis(self.by_order(mount), 0, -1)
                     ),
                     "critical_speeds": [
-                        {
-                            "speed_rpm": rpm * critical.speed,
-                            "factor": critical.factor,
-                            "order": critical.order,
-                            "cmgs": critical.cmgs,
-                            "frequency_hz": critical.mode.damped_frequency_hz,
-                            "damping": critical.mode.damping,
-                            "amplification": critical.amplification,
-                            "mode": critical.mode.name,
-                            "bus_rate_amplitude_deg_s": np.rad2deg(
-                                self.amplitude_at(critical, mount)
-                            ),
-                            "excited": bool(self.excited(mount)[self.orders.index(critical.order)]),
-                        }
-                        for critical in self.critical[mount]
+                        self._critical_dict(critical, mount) for critical in self.critical[mount]
+                    ],
+                    "bearing_critical_speeds": [
+                        self._critical_dict(critical, mount) for critical in self.bearing_critical
                     ],
                 }
                 for mount in self.bus_rate
             },
+        }
+
+    def _critical_dict(self, critical: CriticalSpeed, mount: str) -> dict[str, Any]:
+        return {
+            "speed_rpm": 30.0 / np.pi * critical.speed,
+            "factor": critical.factor,
+            "order": critical.order,
+            "cmgs": critical.cmgs,
+            "frequency_hz": critical.mode.damped_frequency_hz,
+            "damping": critical.mode.damping,
+            "amplification": critical.amplification,
+            "mode": critical.mode.name,
+            "bus_rate_amplitude_deg_s": np.rad2deg(self.amplitude_at(critical, mount)),
+            "excited": bool(self.excited(mount)[self.orders.index(critical.order)]),
         }

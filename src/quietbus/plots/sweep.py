@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 RPM = 30.0 / np.pi
 HERTZ = 0.5 / np.pi
 WIDE = 10.0  # times the slowest mode: a frequency axis longer than this is logarithmic
-DECADES = 5.0  # of amplitude that colours tell apart
+DECADES = 7.0  # of amplitude that colours tell apart
 NO_JITTER = f"no jitter: the rotors shake the bus by less than {NOISE:g} deg/s at every speed"
 
 
@@ -59,6 +59,7 @@ def campbell(sweep: SpeedSweep, name: str) -> Figure:
             linestyle=DASHES[i // len(COLOURS) % len(DASHES)],
             label="decaying" if mode is None else f"{mode.name} (damping {mode.damping:.2g})",
         )
+    inner = _draw_bearings(axes, sweep, shown)
     excited = sweep.excited("isolated")
     for order, speed in _rays(sweep):
         look = "-" if excited[sweep.orders.index(order)] else ":"
@@ -66,7 +67,7 @@ def campbell(sweep: SpeedSweep, name: str) -> Figure:
     for filled, label in ((True, "critical speed"), (False, "crossing, order not excited")):
         found = [
             c
-            for c in sweep.critical["isolated"]
+            for c in (*sweep.critical["isolated"], *sweep.bearing_critical)
             if bool(excited[sweep.orders.index(c.order)]) == filled
         ]
         if found:
@@ -78,13 +79,32 @@ def campbell(sweep: SpeedSweep, name: str) -> Figure:
                 markersize=5,
                 label=label,
             )
-    _scale(axes, sweep, frequency[:, drawn], "rotor speed [rpm]", "damped frequency [Hz]", True)
+    frequency = np.concatenate([frequency[:, drawn], inner], axis=1)
+    _scale(axes, sweep, frequency, "rotor speed [rpm]", "damped frequency [Hz]", True)
     _name_rays(axes, sweep)
     _mark_own_speed(sweep, axes.axvline)
     legend = axes.get_legend_handles_labels()
     title = "modes, named as they are with the rotors still"
     figure.legend(*legend, loc="outside lower center", ncols=2, title=title, title_fontsize=8)
     return figure
+
+
+def _draw_bearings(axes: Axes, sweep: SpeedSweep, shown: np.ndarray) -> np.ndarray:
+    """Modes of the rotors on their bearings; their frequencies (speed, branch) [Hz]."""
+    drawn: list[np.ndarray] = []
+    for bearing in sweep.bearings:
+        frequency = np.array([bearing.vibration.frequencies(f) for f in sweep.factor[shown]])
+        for branch in range(frequency.shape[1]):
+            axes.plot(
+                RPM * sweep.speed[shown],
+                HERTZ * frequency[:, branch],
+                color=COLOURS[-1],
+                linestyle=DASHES[1 + len(drawn) % 3],
+                linewidth=1.0,
+                label=f"rotor on its bearings, {bearing.whirl(branch)}",
+            )
+            drawn.append(HERTZ * frequency[:, branch])
+    return np.array(drawn).T.reshape(int(shown.sum()), len(drawn))
 
 
 def waterfall(sweep: SpeedSweep, name: str) -> Figure:
@@ -105,6 +125,7 @@ def waterfall(sweep: SpeedSweep, name: str) -> Figure:
     for column, (mount, (title, _)) in enumerate(LINES.items()):
         panels[0, column].set_title(title)
         excited = sweep.excited(mount)
+        few = excited.sum() < 3
         for i, axes in enumerate(panels[:, column]):
             if mount == "isolated":
                 for k in drawn:
@@ -122,9 +143,8 @@ def waterfall(sweep: SpeedSweep, name: str) -> Figure:
                     continue
                 rotors = np.isclose(np.abs(sweep.rotor_speed), speed)
                 size = np.rad2deg(np.abs(sweep.bus_rate[mount][:, rotors, o, i])).sum(axis=1)
-                lines = _coloured(
-                    axes, HERTZ * order * speed * sweep.factor[shown], rpm, size[shown], norm
-                )
+                x = HERTZ * order * speed * sweep.factor[shown]
+                lines = _coloured(axes, x, rpm, size[shown], norm, 4.0 if few else 2.0)
             _scale(axes, sweep, modes[:, drawn], "frequency [Hz]" if i == 2 else "", "", False)
             _mark_own_speed(sweep, axes.axhline)
             axes.set_ylabel(f"about {AXES[i]}\nrotor speed [rpm]" if column == 0 else "")
@@ -192,18 +212,20 @@ def _rays(sweep: SpeedSweep) -> list[tuple[float, float]]:
     return [(order, float(speed)) for speed in distinct if speed > 0.0 for order in sweep.orders]
 
 
-def _coloured(axes: Axes, x: np.ndarray, y: np.ndarray, size: np.ndarray, norm: LogNorm):
-    """A line whose colour is the size."""
+def _coloured(
+    axes: Axes, x: np.ndarray, y: np.ndarray, size: np.ndarray, norm: LogNorm, width: float
+) -> LineCollection:
+    """A line whose colour is the size, not drawn where that is too small for one."""
     points = np.stack([x, y], axis=1)
     middle = 0.5 * (size[1:] + size[:-1])
     lines = LineCollection(
         np.stack([points[:-1], points[1:]], axis=1),  # type: ignore[arg-type]
         cmap="viridis",
         norm=norm,
-        linewidths=4.0,
+        linewidths=width,
         capstyle="round",
     )
-    lines.set_array(np.maximum(middle, norm.vmin or 0.0))
+    lines.set_array(np.ma.masked_less(middle, norm.vmin or 0.0))
     axes.add_collection(lines)
     return lines
 
@@ -232,11 +254,12 @@ def _name_rays(axes: Axes, sweep: SpeedSweep) -> None:
     low, most = axes.get_xlim()
     bottom, highest = axes.get_ylim()
     fastest = np.max(np.abs(sweep.rotor_speed))
-    for order, speed in _rays(sweep):
+    for i, (order, speed) in enumerate(_rays(sweep)):
         slope = HERTZ * order * speed / (RPM * fastest)  # [Hz/rpm]
         end = min(most, highest / slope)
         start = max(low, bottom / slope)
-        at = start**0.25 * end**0.75 if low > 0.0 else 0.8 * end
+        part = (0.85, 0.7, 0.55)[i % 3]
+        at = start ** (1.0 - part) * end**part if low > 0.0 else part * end
         axes.annotate(
             f"{order:g}Ω",
             (at, slope * at),

@@ -1,0 +1,82 @@
+"""Pictures of a sweep show the frequencies and amplitudes that were put in, and what is not."""
+
+import numpy as np
+import pytest
+from matplotlib.collections import LineCollection
+
+from quietbus.analysis.sweep import SpeedSweep, SpinningModes, critical_speeds
+from quietbus.plots.sweep import NO_JITTER, sweep_figures
+
+OWN = 2 * np.pi * 50.0
+FACTOR = np.linspace(0.0, 1.2, 121)
+
+
+def plant(natural, count=1):
+    unit = np.eye(count)
+    gyro = np.array([[0.0, 80.0], [-80.0, 0.0]])[:count, :count] * (count > 1)
+    return SpinningModes(unit, 4 * unit, gyro, natural**2 * unit, 0 * unit, np.eye(12, count))
+
+
+def made(size):
+    modes = {"isolated": plant(2 * np.pi * 20.0, 2), "rigid": plant(1.0)}
+    orders = (1.0, 3.5)
+    critical = {
+        "isolated": critical_speeds(modes["isolated"], np.array([OWN]), orders, 1.2),
+        "rigid": (),
+    }
+    lines = np.zeros((len(FACTOR), 1, 2, 3), complex)
+    lines[:, 0, 0, 0] = size * FACTOR**2
+    rates = {"isolated": 0.1 * lines, "rigid": lines}
+    return SpeedSweep(FACTOR, np.array([OWN]), np.zeros(1), orders, rates, modes, critical)
+
+
+@pytest.fixture(scope="module")
+def figures():
+    return sweep_figures(made(1e-4), "made up")
+
+
+def test_campbell_marks_the_crossings_where_they_are(figures):
+    (axes,) = figures["campbell"].axes
+    sweep = made(1e-4)
+    by_label = {line.get_label(): line for line in axes.lines}
+    for label, order in (("critical speed", 1.0), ("crossing, order not excited", 3.5)):
+        points = by_label[label].get_xydata()
+        found = [c for c in sweep.critical["isolated"] if c.order == order]
+        assert len(found) == len(points) == 2
+        for (rpm, hertz), critical in zip(points, found, strict=True):
+            assert rpm == pytest.approx(critical.speed * 30 / np.pi)
+            assert hertz == pytest.approx(order * rpm / 60)
+    modes = [line for line in axes.lines if "damping" in str(line.get_label())]
+    assert len(modes) == 2
+    at_end = sorted(line.get_ydata()[-1] for line in modes)
+    expected = sweep.modes["isolated"].frequencies(1.2) / (2 * np.pi)
+    assert at_end == pytest.approx(expected)
+    assert {text.get_text() for text in axes.texts} == {"1Ω", "3.5Ω"}
+
+
+def test_waterfall_colours_every_excited_ray_by_its_amplitude(figures):
+    panels = [axes for axes in figures["waterfall"].axes if axes.get_ylabel() != "" or axes.lines]
+    rays = [c for c in panels[0].collections if isinstance(c, LineCollection)]
+    assert len(rays) == 1  # order 3.5 shakes nothing
+    points = np.array(rays[0].get_segments())
+    assert points[-1, 1] == pytest.approx([1.2 * 50.0, 1.2 * 3000.0])
+    middle = 0.5 * (FACTOR[2:] ** 2 + FACTOR[1:-1] ** 2) * np.rad2deg(1e-4)
+    assert np.ma.getdata(rays[0].get_array()) == pytest.approx(middle)
+
+
+def test_amplitudes_over_speed_are_drawn_for_both_mounts(figures):
+    axes = figures["speeds"].axes[0]
+    drawn = {line.get_label(): line.get_ydata()[-1] for line in axes.lines}
+    rigid, isolated = (
+        next(value for label, value in drawn.items() if label.startswith("order 1, " + words))
+        for words in ("without", "with platform")
+    )
+    assert isolated == pytest.approx(0.1 * rigid)
+    assert rigid == pytest.approx(1e3 * np.rad2deg(1e-4) * 1.44)  # in 10^-3 deg/s
+
+
+def test_without_jitter_the_pictures_say_so():
+    quiet = sweep_figures(made(0.0), "quiet")
+    for name in ("waterfall", "speeds"):
+        text = " ".join(quiet[name].axes[0].texts[0].get_text().split())
+        assert text == NO_JITTER
