@@ -41,9 +41,7 @@ class PlatformStudy:
         _check_shared(self.scenarios)
         for scenario in self.scenarios:
             if isinstance(scenario.cluster, WheelCluster):
-                said = (
-                    "expected cmg, since several platforms are for CMGs only; got wheel"
-                )
+                said = "expected cmg, since several platforms are for CMGs only; got wheel"
                 raise ScenarioError(scenario.name, [Problem(said, ("cluster", "type"))])
         error = self.platforms.rest_error
         if error > AT_REST:

@@ -206,6 +206,6 @@ def test_a_realisation_has_the_spectra_of_its_tables():
 def test_noise_without_a_realisation_is_refused():
     table = Spectrum(jnp.array([5.0, 50.0]), jnp.array([2.0, 0.5]), False)
     noisy = disturbance(broadband=((table, None, None, None),) * 4)
+    cluster = paper_satellite().cluster
     with pytest.raises(ValueError, match="needs a realisation"):
-        cluster = paper_satellite().cluster
         noisy.wrench(cluster, jnp.zeros(()), jnp.zeros(4), cluster.rotor_speed)
