@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from quietbus.build import build_satellite
 from quietbus.model.cmg import ClusterMoments, ControlMomentGyro, momentum_P
+from quietbus.model.rotor import RunUp
 from quietbus.scenario import load_scenario
 
 ANGLES = (0.7, -1.1, 0.4)  # gimbal angle, rotor angle [rad], gimbal rate [rad/s] of a case
@@ -141,6 +142,34 @@ def test_averaged_moments_are_the_mean_over_the_rotor_angles():
         values = np.asarray(getattr(at, name))
         error = np.abs(getattr(averaged, name) - values.mean(axis=0)).max()
         assert error <= 1e-13 * np.abs(values).max(), name
+
+
+def test_orders_add_up_to_the_moments_while_speeds_change():
+    """Real part of the sum over units and orders of amplitude exp(i h phi)."""
+    one = jnp.ones(3)
+    drive = RunUp(0 * one, one, 0 * one, one, "linear")
+    cluster = eqx.tree_at(
+        lambda c: c.drive, random_cluster(), drive, is_leaf=lambda leaf: leaf is None
+    )
+    rng = np.random.default_rng(3)
+    gamma, phi = rng.uniform(-np.pi, np.pi, (2, 3))
+    rate, acceleration = rng.normal(size=(2, 3))
+    speed, spin_up = 30.0 * rng.normal(size=3), 500.0 * rng.normal(size=3)
+
+    @jax.jit
+    def both(cluster):
+        moments = ClusterMoments.expand(cluster).turning(speed, spin_up)
+        orders = [moments.order(h, gamma, rate, acceleration) for h in (0, 1, 2)]
+        return moments.at(gamma, phi, rate, acceleration), orders
+
+    whole, orders = both(cluster)
+    for name in ("c", "J", "p", "H", "J_rate", "p_rate", "H_rate"):
+        total = 0.0
+        for h, amplitude in enumerate(orders):
+            value = np.asarray(getattr(amplitude, name))
+            turned = np.exp(1j * h * phi).reshape(-1, *[1] * (value.ndim - 1))
+            total = total + np.sum((value * turned).real, axis=0)
+        close(total, np.asarray(getattr(whole, name)))
 
 
 def close(found, expected, relative=1e-12):
