@@ -11,7 +11,7 @@ import pytest
 import quietbus as qb
 from quietbus import cli
 from quietbus.plots import pointing_figures
-from quietbus.verification import ARCSEC, image_motion
+from quietbus.verification import ARCSEC, _errors, image_motion
 
 STILL = {"initial": {"attitude": [0, 0, 0], "steady": True}, "simulation.duration": 0.5}
 # every motion that there is moves this image, each by about as much
@@ -64,6 +64,15 @@ def test_image_motion_of_both_solvers_is_the_same(both):
     truth = truth - truth.mean(axis=0)
     lines = lines - lines.mean(axis=0)
     assert np.max(np.abs(lines - truth)) < 5e-3 * np.max(np.abs(truth))
+
+
+def test_a_displacement_of_the_whole_satellite_is_one_of_the_bus_alone(both):
+    run = both["direct"].run
+    shift = np.array([0.1, -0.2, 0.3])
+    moved = run.assign({name: run[name] + shift for name in ("bus_position", "platform_position")})
+    change = _errors(moved, both["direct"].scenario) - _errors(run, both["direct"].scenario)
+    expected = np.concatenate([np.zeros(3), shift, np.zeros(6)])
+    assert change == pytest.approx(np.broadcast_to(expected, change.shape), abs=1e-6)
 
 
 @pytest.mark.parametrize("i", range(len(ALL)), ids=[each["metric"] for each in ALL])

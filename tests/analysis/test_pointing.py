@@ -359,6 +359,16 @@ def test_mtf_loss_of_a_fast_sine_is_the_true_one_while_it_is_small():
     assert found == pytest.approx(1.0 - mtf_sine_jitter(A, nu), rel=2e-2)
 
 
+def test_mtf_loss_is_that_of_the_worst_direction():
+    """Motion along one oblique axis: gratings across it lose as one component does, others less."""
+    oblique = with_lines([[0.6 * A, 0.8 * A]], 2 * np.pi * F)
+    which = Metric("MTF_loss", T, 0, 0, 0.02)
+    one = evaluate(SINE_LINE, which, (1.0, 9.0), RMS)
+    assert evaluate(oblique, which, (1.0, 9.0), RMS) == pytest.approx(one, rel=5e-3)
+    part = evaluate(oblique.component(0), which, (1.0, 9.0), RMS)
+    assert part == pytest.approx(0.36 * one, rel=2e-2)
+
+
 # ---- bad input
 
 
