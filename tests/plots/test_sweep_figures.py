@@ -36,7 +36,7 @@ def figures():
 
 
 def test_campbell_marks_the_crossings_where_they_are(figures):
-    (axes,) = figures["campbell"].axes
+    axes, change = figures["campbell"].axes
     sweep = made(1e-4)
     by_label = {line.get_label(): line for line in axes.lines}
     for label, order in (("critical speed", 1.0), ("crossing, order not excited", 3.5)):
@@ -51,6 +51,9 @@ def test_campbell_marks_the_crossings_where_they_are(figures):
     at_end = sorted(line.get_ydata()[-1] for line in modes)
     expected = sweep.modes["isolated"].frequencies(1.2) / (2 * np.pi)
     assert at_end == pytest.approx(expected)
+    still = 20.0 * np.sqrt(1 - (2 / (2 * np.pi * 20.0)) ** 2)
+    split = sorted(line.get_ydata()[-1] for line in change.lines[:2])
+    assert split == pytest.approx(100 * (expected / still - 1), abs=1e-6)
     assert {text.get_text() for text in axes.texts} == {"1Ω", "3.5Ω"}
 
 
