@@ -48,9 +48,9 @@ def campbell(sweep: SpeedSweep, name: str) -> Figure:
     shown = sweep.factor > 0.0
     rpm = RPM * sweep.speed[shown]
     at_rest, frequency = np.split(_mode_frequencies(sweep), [1])
-    at_rest = np.where(at_rest[0] > 0.0, at_rest[0], np.nan)
+    at_rest = at_rest[0]
     names = sweep.modes["isolated"].modes(0.0)
-    drawn = [k for k in range(frequency.shape[1]) if _elastic(frequency[:, k])]
+    drawn = _elastic(sweep)
     for i, k in enumerate(drawn):
         mode, drawn_at = names[k], np.where(frequency[:, k] > 0.0, frequency[:, k], np.nan)
         look = {
@@ -128,7 +128,7 @@ def waterfall(sweep: SpeedSweep, name: str) -> Figure:
     shown = sweep.factor > 0.0
     rpm = RPM * sweep.speed[shown]
     modes = _mode_frequencies(sweep)[shown]
-    drawn = [k for k in range(modes.shape[1]) if _elastic(modes[:, k])]
+    drawn = _elastic(sweep)
     lines = None
     for column, (mount, (title, _)) in enumerate(LINES.items()):
         panels[0, column].set_title(title)
@@ -209,9 +209,12 @@ def _mode_frequencies(sweep: SpeedSweep) -> np.ndarray:
     return HERTZ * np.array([modes.frequencies(factor) for factor in sweep.factor])
 
 
-def _elastic(frequency: np.ndarray) -> bool:
-    """A mode of the platform: not a rigid body's, which is still at rest and slow at speed."""
-    return bool(frequency[0] > 0.0 and frequency.max() > 1e-2 * frequency[-1])
+def _elastic(sweep: SpeedSweep) -> list[int]:
+    """Places of the modes that oscillate with the rotors still.
+
+    Not of a rigid body's, which nutates at speed, far more slowly.
+    """
+    return np.flatnonzero(sweep.modes["isolated"].frequencies(0.0) > 0.0).tolist()
 
 
 def _rays(sweep: SpeedSweep) -> list[tuple[float, float]]:
