@@ -1,4 +1,5 @@
 from .analysis.isolator import SingleAxisIsolator as SingleAxisIsolator
+from .analysis.run_up import compare_run_up as compare_run_up
 from .analysis.waterfall import FitError as FitError
 from .api import QuietbusWarning as QuietbusWarning
 from .api import SimulationError as SimulationError

@@ -60,12 +60,13 @@ def test_another_order_is_followed_among_others():
     speed = 20.0 + 1.0 * t
     phi = 20.0 * t + 0.5 * t**2
     signal = np.stack([3 * np.cos(phi) + 0.7 * np.cos(2.5 * phi + 1), np.cos(2.5 * phi)], axis=1)
+    signal += 300.0 * np.tanh((t - 20.0) / 8.0)[:, None]  # slow motion, far larger
     flat = np.ones((2, 2))
     one = follow(t, speed, signal, [10.0, 100.0], flat, 1.0)
     assert one.amplitude[:, 0] == pytest.approx(3.0, rel=0.01)
     other = follow(t, speed, signal, [10.0, 100.0], flat, 2.5)
     assert other.amplitude[:, 0] == pytest.approx(0.7, rel=0.01)
-    assert other.error[1] < 1e-3
+    assert other.error[1] < 2e-3
 
 
 def dataset(acceleration=2.0):

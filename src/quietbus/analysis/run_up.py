@@ -2,8 +2,9 @@
 
 The amplitude of one order is followed through the run: the signal, sampled anew at equal rotor
 angles, is multiplied with the order's conjugate and averaged over some turns under a Hann window.
-A quasi-steady run has the map's amplitude at its speed. One that passes a resonance fast lags
-behind: its peak is lower and comes at a higher speed (F. M. Lewis 1932, "Vibration during
+What is slower, the motion that the changing momentum causes say, is taken off by the same window
+before. A quasi-steady run has the map's amplitude at its speed. One that passes a resonance fast
+lags behind: its peak is lower and comes at a higher speed (F. M. Lewis 1932, "Vibration during
 acceleration through a critical speed").
 """
 
@@ -18,7 +19,7 @@ from scipy.signal import fftconvolve
 
 from quietbus.analysis.sweep import SpeedSweep
 
-TURNS = 8.0  # rotor turns, over the order, that one amplitude is taken from
+TURNS = 4.0  # of the rotor that one amplitude is taken from; tells orders apart by 0.5
 SAMPLES = 32  # a turn and order
 LEAST_RATE = 4.0  # samples of the signal a period of the line
 
@@ -121,15 +122,20 @@ def follow(
         )
     angle = order * cumulative_trapezoid(speed, time, initial=0.0)
     count = int(SAMPLES * angle[-1] / (2.0 * np.pi)) + 1
-    width = int(SAMPLES * TURNS) + 1
-    if count < 2 * width:
-        raise ValueError(f"expected at least {2 * TURNS:g} periods of the line in the run")
+    periods = TURNS * max(order, 1.0)
+    width = int(SAMPLES * periods) + 1
+    if count < 3 * width:
+        raise ValueError(f"expected at least {3 * periods:g} periods of the line in the run")
     even = np.arange(count) * 2.0 * np.pi / SAMPLES
     when = CubicSpline(angle, time)(even)
-    turned = CubicSpline(time, signal)(when) * np.exp(-1j * even)[:, None]
     window = np.hanning(width + 2)[1:-1, None]
-    amplitude = 2.0 * np.abs(fftconvolve(turned, window / window.sum(), mode="valid", axes=0))
-    middle = slice(width // 2, width // 2 + len(amplitude))
+    window = window / window.sum()
+    inner = slice(width // 2, count - width // 2)
+    again = CubicSpline(time, signal)(when)
+    slow = fftconvolve(again, window, mode="valid", axes=0)  # the line has no share in it
+    turned = (again[inner] - slow) * np.exp(-1j * even[inner])[:, None]
+    amplitude = 2.0 * np.abs(fftconvolve(turned, window, mode="valid", axes=0))
+    middle = slice(2 * (width // 2), count - 2 * (width // 2))
     at = np.interp(when[middle], time, speed)
     steady = CubicSpline(map_speed, map_amplitude)(at)
     return RunUp(order, when[middle], at, amplitude, steady)

@@ -43,27 +43,32 @@ def sweep_figures(sweep: SpeedSweep, name: str) -> dict[str, Figure]:
 
 def campbell(sweep: SpeedSweep, name: str) -> Figure:
     """Modes of the satellite on its platform over rotor speed, the orders' rays, and crossings."""
-    figure = new_figure(5.2, f"Modes over rotor speed, gimbals held ({name})")
-    axes = figure.subplots()
+    figure = new_figure(6.6, f"Modes over rotor speed, gimbals held ({name})")
+    axes, change = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
     shown = sweep.factor > 0.0
     rpm = RPM * sweep.speed[shown]
-    frequency = _mode_frequencies(sweep)[shown]
+    at_rest, frequency = np.split(_mode_frequencies(sweep), [1])
+    at_rest = at_rest[0]
     names = sweep.modes["isolated"].modes(0.0)
-    drawn = [k for k in range(frequency.shape[1]) if _elastic(frequency[:, k])]
+    drawn = _elastic(sweep)
     for i, k in enumerate(drawn):
-        mode = names[k]
+        mode, drawn_at = names[k], np.where(frequency[:, k] > 0.0, frequency[:, k], np.nan)
+        look = {
+            "color": COLOURS[i % len(COLOURS)],
+            "linestyle": DASHES[i // len(COLOURS) % len(DASHES)],
+        }
+        change.plot(rpm, 100.0 * (drawn_at / at_rest[k] - 1.0), **look)
         axes.plot(
             rpm,
-            np.where(frequency[:, k] > 0.0, frequency[:, k], np.nan),
-            color=COLOURS[i % len(COLOURS)],
-            linestyle=DASHES[i // len(COLOURS) % len(DASHES)],
+            drawn_at,
+            **look,
             label="decaying" if mode is None else f"{mode.name} (damping {mode.damping:.2g})",
         )
     inner = _draw_bearings(axes, sweep, shown)
     excited = sweep.excited("isolated")
     for order, speed in _rays(sweep):
-        look = "-" if excited[sweep.orders.index(order)] else ":"
-        axes.plot(rpm, HERTZ * order * speed * sweep.factor[shown], look, color="0.45", linewidth=1)
+        dash = "-" if excited[sweep.orders.index(order)] else ":"
+        axes.plot(rpm, HERTZ * order * speed * sweep.factor[shown], dash, color="0.45", linewidth=1)
     for filled, label in ((True, "critical speed"), (False, "crossing, order not excited")):
         found = [
             c
@@ -82,7 +87,10 @@ def campbell(sweep: SpeedSweep, name: str) -> Figure:
     frequency = np.concatenate([frequency[:, drawn], inner], axis=1)
     _scale(axes, sweep, frequency, "rotor speed [rpm]", "damped frequency [Hz]", True)
     _name_rays(axes, sweep)
-    _mark_own_speed(sweep, axes.axvline)
+    change.set(xlabel=axes.get_xlabel(), ylabel="split by the\nmomentum [%]")
+    axes.set_xlabel("")
+    for panel in (axes, change):
+        _mark_own_speed(sweep, panel.axvline)
     legend = axes.get_legend_handles_labels()
     title = "modes, named as they are with the rotors still"
     figure.legend(*legend, loc="outside lower center", ncols=2, title=title, title_fontsize=8)
@@ -120,7 +128,7 @@ def waterfall(sweep: SpeedSweep, name: str) -> Figure:
     shown = sweep.factor > 0.0
     rpm = RPM * sweep.speed[shown]
     modes = _mode_frequencies(sweep)[shown]
-    drawn = [k for k in range(modes.shape[1]) if _elastic(modes[:, k])]
+    drawn = _elastic(sweep)
     lines = None
     for column, (mount, (title, _)) in enumerate(LINES.items()):
         panels[0, column].set_title(title)
@@ -201,9 +209,12 @@ def _mode_frequencies(sweep: SpeedSweep) -> np.ndarray:
     return HERTZ * np.array([modes.frequencies(factor) for factor in sweep.factor])
 
 
-def _elastic(frequency: np.ndarray) -> bool:
-    """A mode of the platform: not a rigid body's, which is still at rest and slow at speed."""
-    return bool(frequency[0] > 0.0 and frequency.max() > 1e-2 * frequency[-1])
+def _elastic(sweep: SpeedSweep) -> list[int]:
+    """Places of the modes that oscillate with the rotors still.
+
+    Not of a rigid body's, which nutates at speed, far more slowly.
+    """
+    return np.flatnonzero(sweep.modes["isolated"].frequencies(0.0) > 0.0).tolist()
 
 
 def _rays(sweep: SpeedSweep) -> list[tuple[float, float]]:

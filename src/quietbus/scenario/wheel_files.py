@@ -251,7 +251,7 @@ def _merged(file: Path, rows: Sequence[_Row]) -> tuple[dict[str, Any], ...]:
         phases = {kind: row.phase for kind, row in by_kind.items()}
         one = set(phases.values())
         data: dict[str, Any] = {"order": order}
-        data |= {kind: row.coefficient for kind, row in by_kind.items()}
+        data |= {kind: float(f"{row.coefficient:.12g}") for kind, row in by_kind.items()}
         if backward:
             data["whirl"] = "backward"
         orders.append(data | {"phase": one.pop() if len(one) == 1 else phases})
