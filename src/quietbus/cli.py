@@ -333,6 +333,8 @@ def _checks(scenario: Scenario, export: Path | None) -> list[Check]:
     if export is not None:
         export.write_text(checking.write_mjcf(satellite, state), encoding="utf-8")
         print(f"wrote {export}")
+    if satellite.disturbance is not None or satellite.motor is not None:
+        print("checked without the rotors' disturbances and the gimbal motors' ripple")
     with _status() as tell:
         return checking.validate(satellite, state, progress=tell)
 

@@ -236,7 +236,7 @@ def jitter_tables(numbers: Mapping[str, Any]) -> Iterator[Table]:
         for i, axis in enumerate(AXES):
             lines.add_row(
                 *(
-                    (str(line["cmg"]), str(line["order"]), f"{line['frequency_hz']:.5g} Hz")
+                    (str(line["cmg"]), f"{line['order']:g}", f"{line['frequency_hz']:.5g} Hz")
                     if i == 0
                     else ("", "", "")
                 ),
@@ -283,7 +283,7 @@ def jitter_tables(numbers: Mapping[str, Any]) -> Iterator[Table]:
     for part in numbers["budget"][own]:
         if max(part["bus_rate_amplitude_deg_s"]) > NOISE:
             cells = [f"{value:.3e}" for value in part["bus_rate_amplitude_deg_s"]]
-            parts.add_row(str(part["cmg"]), part["kind"], str(part["order"]), *cells)
+            parts.add_row(str(part["cmg"]), part["kind"], f"{part['order']:g}", *cells)
     parts.caption = f"parts below {NOISE:g} deg/s left out"
     yield parts
 

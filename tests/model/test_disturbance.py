@@ -90,7 +90,7 @@ def rocking():
 
 
 def test_rocking_is_the_response_of_the_four_state_matrix(rocking):
-    zeta, natural, speed, A, B, C = rocking
+    zeta, natural, _, A, B, C = rocking
     shaking = disturbance(period=(0, 0, 1 / natural), damping=(1, 1, zeta))
     cluster = paper_satellite().cluster
     omega = np.linspace(-700.0, 1500.0, 12)
@@ -106,7 +106,7 @@ def test_rocking_is_the_response_of_the_four_state_matrix(rocking):
 
 def test_whirl_frequencies_are_the_eigenvalues_and_the_published_split(rocking):
     """Undamped: w = +-q + sqrt(q^2 + w0^2), q = I_s Omega / (2 I_t) (Masterson 1999)."""
-    zeta, natural, speed, A, _, C = rocking
+    _, natural, speed, A, _, C = rocking
     undamped = A - np.block([[np.zeros((2, 4))], [np.zeros((2, 2)), -C[:, 2:] / ACROSS]])
     q = SPIN * speed / (2 * ACROSS)
     split = np.sqrt(q**2 + natural**2) + q * np.array([-1.0, 1.0])

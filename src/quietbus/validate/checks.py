@@ -23,7 +23,7 @@ from quietbus.dynamics.invariants import (
 )
 from quietbus.dynamics.state import State
 from quietbus.model.satellite import Satellite
-from quietbus.model.variants import without_friction, without_rotation
+from quietbus.model.variants import without_disturbance, without_friction, without_rotation
 from quietbus.validate.reference import Reference
 from quietbus.validate.states import kicked_state, random_state, random_wrench
 from quietbus.validate.trajectory import (
@@ -60,6 +60,8 @@ def validate(
 ) -> list[Check]:
     """Check a satellite; needs MuJoCo (``pip install 'quietbus[validate]'``).
 
+    Disturbances beyond imbalance are left out: as external forces they keep no momentum.
+
     Args:
         state: initial state of the scenario.
         random_states: how many states to compare accelerations at.
@@ -70,6 +72,7 @@ def validate(
     Raises:
         ImportError: MuJoCo is not installed.
     """
+    satellite = without_disturbance(satellite)
     rng = np.random.default_rng(seed)
     kicked = kicked_state(satellite, state, rng)
     times = np.linspace(0.0, duration, 21)
