@@ -18,7 +18,7 @@ from quietbus.dynamics.linearize import linearize as linearize_satellite
 from quietbus.dynamics.vibration import View
 from quietbus.jitter_study import JitterStudy
 from quietbus.platform_study import PlatformStudy
-from quietbus.resolution import refuse_coarse_output, refuse_coarse_tolerance, ripple_unseen
+from quietbus.resolution import refuse_coarse_output, refuse_coarse_tolerance, unseen
 from quietbus.results import aliasing, rotor_notes, to_dataset
 from quietbus.scenario import LineOfSight, Problem, Scenario, ScenarioError, load_scenario
 from quietbus.scenario.pointing import NO_REQUIREMENTS
@@ -106,9 +106,9 @@ def simulate(
     if run.attrs["status"] == "stopped":
         raise SimulationError(run.attrs["stop_reason"], run)
     if method == "direct":
-        unseen = ripple_unseen(scenario, run["gimbal_rate"].to_numpy())
-        if unseen:
-            raise SimulationError(unseen, run)
+        aliased = _aliased(scenario, run)
+        if aliased:
+            raise SimulationError(aliased, run)
     if run.attrs["status"] == "interrupted":
         warnings.warn(run.attrs["stop_reason"], QuietbusWarning, stacklevel=2)
     return run
@@ -154,8 +154,8 @@ def compare(
         for mount, future in futures.items():
             runs[mount] = future.result()
     for name, done in runs.items():
-        unseen = ripple_unseen(_as_run(scenario, None, duration), done["gimbal_rate"].to_numpy())
-        for note in (*filter(None, [unseen]), *rotor_notes(done)):
+        aliased = _aliased(_as_run(scenario, None, duration), done)
+        for note in (*filter(None, [aliased]), *rotor_notes(done)):
             warnings.warn(f"{name}: {note}", QuietbusWarning, stacklevel=2)
     return runs
 
@@ -302,6 +302,12 @@ def linearize(
         actuator,
         {name: _vector(f"points[{name!r}]", p, 3) for name, p in (points or {}).items()},
     )
+
+
+def _aliased(scenario: Scenario, run: xr.Dataset) -> str:
+    """What the output rate could not show, as the run tells, or nothing."""
+    speeds = run["rotor_speed"].to_numpy() if "rotor_speed" in run else None
+    return unseen(scenario, run["gimbal_rate"].to_numpy(), speeds)
 
 
 def _gimbal_angles(scenario: Scenario, angles: ArrayLike | None) -> np.ndarray:

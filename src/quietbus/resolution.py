@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from quietbus.analysis.residual import RESOLVING, shows
 from quietbus.scenario import Problem, Scenario, ScenarioError
-from quietbus.scenario.hardware import Unit
-from quietbus.scenario.wheels import Wheel
 from quietbus.solve.harmonic import steady_speeds
 
 if TYPE_CHECKING:
@@ -37,16 +35,27 @@ def refuse_coarse_output(scenario: Scenario) -> None:
     raise ScenarioError(scenario.name, [Problem(text, ("simulation", "output_rate"))])
 
 
-def _declared(scenario: Scenario) -> Iterator[tuple[float, str]]:
-    """Highest frequency [Hz] and name of what each rotor's disturbance holds."""
-    units: tuple[Unit | Wheel, ...] = scenario.cluster.placed()
+def _declared(scenario: Scenario, speed: np.ndarray | None = None) -> Iterator[tuple[float, str]]:
+    """Highest frequency [Hz] and name of what each rotor's disturbance holds.
+
+    Args:
+        speed: (cmg,) [rad/s] that rotors have reached, if that is more than the scenario says.
+    """
+    units: tuple[Any, ...] = scenario.cluster.placed()
+    nominal: list[float] = [float(unit.rotor.speed) if unit.rotor else 0.0 for unit in units]
+    fastest = np.abs(np.array(nominal))
+    if scenario.cluster.run_up is not None:
+        ends = scenario.cluster.run_up.speeds(tuple(nominal))
+        fastest = np.max(np.abs([fastest, *ends]), axis=0)
+    if speed is not None:
+        fastest = np.maximum(fastest, speed)
     for j, unit in enumerate(units):
         rotor = unit.rotor
         if rotor is None or rotor.disturbance is None:
             continue
         for line in rotor.disturbance.orders or ():
-            if line.acts and rotor.speed:
-                frequency = line.order * abs(rotor.speed) / (2.0 * np.pi)
+            if line.acts and fastest[j]:
+                frequency = line.order * float(fastest[j]) / (2.0 * np.pi)
                 yield frequency, f"order {line.order:g} of rotor {j}"
         for name, spectrum in rotor.disturbance.broadband.given().items():
             words = name.replace("_", " ")
@@ -79,22 +88,28 @@ def refuse_coarse_tolerance(scenario: Scenario, satellite: Satellite, state: Sta
     raise ScenarioError(scenario.name, [Problem(text, ("simulation", "tolerances", "absolute"))])
 
 
-def ripple_unseen(scenario: Scenario, gimbal_rate: np.ndarray) -> str:
-    """Why the output rate could not show the gimbal motors' lines, or an empty text.
+def unseen(
+    scenario: Scenario, gimbal_rate: np.ndarray, rotor_speed: np.ndarray | None = None
+) -> str:
+    """Why the output rate could not show lines whose frequency only the run tells, or nothing.
 
     Args:
         gimbal_rate: (n, cmg) of the run [rad/s].
+        rotor_speed: (n, cmg) of the run [rad/s], if speeds change.
     """
+    found: list[tuple[float, str]] = []
+    if rotor_speed is not None and rotor_speed.size:
+        found += _declared(scenario, np.max(np.abs(rotor_speed), axis=0))
     motor = scenario.cluster.gimbal_motor
-    if motor is None or not gimbal_rate.size:
-        return ""
-    frequency = max(motor.lines) * float(np.max(np.abs(gimbal_rate))) / (2.0 * np.pi)
+    if motor is not None and gimbal_rate.size:
+        frequency = max(motor.lines) * float(np.max(np.abs(gimbal_rate))) / (2.0 * np.pi)
+        found.append((frequency, f"the gimbal motors' line {max(motor.lines)} in a turn"))
     rate = scenario.simulation.output_rate
+    frequency, what = max(found, default=(0.0, ""))
     if shows(rate, frequency):
         return ""
     return (
-        f"simulation.output_rate: expected at least {RESOLVING * frequency:.4g} Hz to show "
-        f"the gimbal motors' line {max(motor.lines)} in a turn, at {frequency:.4g} Hz when the "
-        f"gimbals are fastest; got {rate:g} Hz. The run was integrated with it, but its output is "
-        f"aliased; {INSTEAD}"
+        f"simulation.output_rate: expected at least {RESOLVING * frequency:.4g} Hz to show {what}, "
+        f"at {frequency:.4g} Hz when it is fastest; got {rate:g} Hz. The run was integrated "
+        f"with it, but its output is aliased; {INSTEAD}"
     )
