@@ -162,7 +162,9 @@ def test_scenario_page_has_every_key_with_unit_and_default():
     assert len(documented) == len(rows), "a key is documented twice"
     keys: dict = {}
     for key, described in _keys(qb.Scenario):
-        keys.setdefault(key, described)  # what CMGs and wheels have in common is described once
+        if key in keys and key.startswith("cluster."):
+            continue  # what CMGs and wheels have in common is described once, as of CMGs
+        keys[key] = described
     mappings = {key for key, (is_mapping, _, _) in keys.items() if is_mapping}
     assert documented.keys() - keys.keys() == set()
     assert {key for key in mappings if f"`{key}`" not in page} == set()
