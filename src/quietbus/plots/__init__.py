@@ -6,7 +6,7 @@ from quietbus.plots.jitter import jitter_figures
 from quietbus.plots.pointing import pointing_figures
 from quietbus.plots.run import run_figures
 from quietbus.plots.style import save_figures
-from quietbus.plots.sweep import sweep_figures
+from quietbus.plots.sweep import run_up_figure, sweep_figures
 
 __all__ = [
     "analysis_figures",
@@ -15,6 +15,7 @@ __all__ = [
     "jitter_figures",
     "pointing_figures",
     "run_figures",
+    "run_up_figure",
     "save_figures",
     "sweep_figures",
 ]

@@ -1,0 +1,43 @@
+"""Run-ups by the direct solver through the platform's modes, against the quasi-steady map."""
+
+import numpy as np
+import pytest
+
+import quietbus as qb
+
+RPM = np.pi / 30.0
+
+
+def run_up(seconds, damping):
+    """From 60 to 500 rpm through the modes from 2.7 to 5 Hz, at constant acceleration."""
+    ramp = {"initial_speed": 60 * RPM, "final_speed": 500 * RPM, "duration": seconds}
+    scenario = qb.load_scenario("zhang2012").with_overrides(
+        {
+            "control": "none",
+            "initial.attitude": [0, 0, 0],
+            "cluster.run_up": ramp | {"shape": "linear"},
+            "isolator.legs.damping": damping,
+            "simulation": {"duration": seconds, "output_rate": 200.0},
+        }
+    )
+    run = qb.simulate(scenario)
+    keep = run["time"].to_numpy() > 0.02 * seconds  # rotors turn from the first instant
+    sweep = qb.jitter(scenario).sweep(max_speed=520 * RPM)
+    return qb.compare_run_up(run.isel(time=keep), sweep, "isolated")
+
+
+@pytest.mark.slow
+def test_a_slow_run_up_follows_the_map_the_closer_the_slower():
+    """The lag of an amplitude that changes at the rate a is a over the damping of the mode."""
+    errors = np.array([run_up(seconds, 500.0).error for seconds in (40.0, 160.0)])
+    assert np.max(errors[0]) < 0.15
+    assert np.max(errors[1]) < 0.04
+    assert np.all(errors[1] < 0.4 * errors[0])
+
+
+@pytest.mark.slow
+def test_a_fast_run_up_with_little_damping_peaks_later_and_lower():
+    """Lewis 1932: the faster, the lower the peak and the higher its speed."""
+    fast, slow = (run_up(seconds, 50.0).peaks(0) for seconds in (10.0, 80.0))
+    assert fast["amplitude"] < slow["amplitude"] < 1.02 * fast["quasi_steady_amplitude"]
+    assert fast["speed"] > slow["speed"] > 0.99 * fast["quasi_steady_speed"]
