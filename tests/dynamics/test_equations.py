@@ -66,6 +66,9 @@ def body_loads(vectors):
 
 def same_state(found, expected, atol):
     for name, value in vars(expected).items():
+        if value is None:  # rotors at constant speed have no state of their own
+            assert getattr(found, name) is None
+            continue
         np.testing.assert_allclose(getattr(found, name), value, atol=atol, err_msg=name)
 
 

@@ -49,7 +49,7 @@ from quietbus.spatial.vector import cross
 
 TOLERANCES = Tolerances(1e-7, 1e-9)  # of the slow motion
 LEG_ERROR = 1e-5  # [m, rad] of the plate's pose between the legs' linearisations
-INSTANTS = 256  # responses per call, so that progress can be shown and a run stopped
+INSTANTS = 128  # responses per call, so that one program serves start and run, which can be stopped
 LEG_INSTANTS = 16  # linearisations of the legs per call
 LOOKS = 8  # instants at the most at which the modes are computed
 SLOW_CHANGE = 0.05  # largest estimated error of the jitter that needs no warning
@@ -461,7 +461,7 @@ class _Along:
 
     def chunk(self, instants: np.ndarray, view: View) -> Chunk:
         """Complex amplitudes (instant, cmg, order, ...) and the equations that they solve."""
-        t, states = self._at(instants, INSTANTS if len(self.time) > 1 else 1)
+        t, states = self._at(instants, INSTANTS)
         legs = self._legs(instants)
         legs = np.concatenate([legs, np.repeat(legs[-1:], len(t) - len(legs), axis=0)])
         result = _compiled_chunk(self.satellite, t, states, legs, view, self.one_speed)
