@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from quietbus.plots.signals import AXES, LINES, NOISE
 from quietbus.plots.style import COLOURS, DASHES, explain, new_figure, scaled, share_legend, style
@@ -124,7 +124,7 @@ def waterfall(sweep: SpeedSweep, name: str) -> Figure:
         explain(figure.subplots(), NO_JITTER)
         return figure
     panels = figure.subplots(3, 2, sharex=True, sharey=True)
-    norm = LogNorm(highest * 10.0**-DECADES, highest)
+    norm = LogNorm(_floor(sweep, sizes, highest), highest)
     shown = sweep.factor > 0.0
     rpm = RPM * sweep.speed[shown]
     modes = _mode_frequencies(sweep)[shown]
@@ -189,7 +189,7 @@ def speeds(sweep: SpeedSweep, name: str) -> Figure:
             if sweep.excited("isolated")[sweep.orders.index(c.order)]:
                 at = RPM * c.factor * np.max(np.abs(sweep.rotor_speed))
                 axes.axvline(at, color="0.7", linewidth=0.8, zorder=0)
-        axes.set_ylim(factor * highest * 10.0**-DECADES, 2.0 * factor * highest)
+        axes.set_ylim(factor * _floor(sweep, sizes, highest), 2.0 * factor * highest)
         axes.set_ylabel(f"about {AXES[i]}\n[{unit}]")
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         _mark_own_speed(sweep, axes.axvline)
@@ -201,6 +201,13 @@ def speeds(sweep: SpeedSweep, name: str) -> Figure:
     panels[-1].set_xlabel("rotor speed [rpm]")
     share_legend(figure, panels[0])
     return figure
+
+
+def _floor(sweep: SpeedSweep, sizes: dict[str, np.ndarray], highest: float) -> float:
+    """The least amplitude drawn: of the orders drawn, but not below what colours tell apart."""
+    drawn = np.concatenate([sizes[m][:, sweep.excited(m)].ravel() for m in LINES])
+    least = float(drawn[drawn > 0.0].min(initial=highest))
+    return min(max(least, highest * 10.0**-DECADES), 0.1 * highest)
 
 
 def _mode_frequencies(sweep: SpeedSweep) -> np.ndarray:
@@ -254,10 +261,17 @@ def _scale(
         low = 0.3 * slowest
         limits = {"speed": (most * low / highest, most), "frequency": (low, highest)}
         axes.set(xscale="log", yscale="log")
+        few = highest < 100.0 * low  # decades
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            axis.set_minor_formatter(FuncFormatter(_between_decades) if few else NullFormatter())
     names = ("speed", "frequency") if speed_along_x else ("frequency", "speed")
     axes.set(xlabel=x, ylabel=y, xlim=limits[names[0]], ylim=limits[names[1]])
+
+
+def _between_decades(value: float, _: object) -> str:
+    """Labels of 2 and 5 alone: there is no room for all digits."""
+    return f"{value:g}" if f"{value:e}"[0] in "25" else ""
 
 
 def _name_rays(axes: Axes, sweep: SpeedSweep) -> None:
