@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 RPM = 30.0 / np.pi
 HERTZ = 0.5 / np.pi
 WIDE = 10.0  # times the slowest mode: a frequency axis longer than this is logarithmic
+LEAST_SPLIT = 0.01  # [%]
 DECADES = 7.0  # of amplitude that colours tell apart
 NO_JITTER = f"no jitter: the rotors shake the bus by less than {NOISE:g} deg/s at every speed"
 
@@ -88,6 +89,8 @@ def campbell(sweep: SpeedSweep, name: str) -> Figure:
     _scale(axes, sweep, frequency, "rotor speed [rpm]", "damped frequency [Hz]", True)
     _name_rays(axes, sweep)
     change.set(xlabel=axes.get_xlabel(), ylabel="split by the\nmomentum [%]")
+    if np.abs(change.get_ylim()).max() < LEAST_SPLIT:  # rounding
+        change.set_ylim(-LEAST_SPLIT, LEAST_SPLIT)
     axes.set_xlabel("")
     for panel in (axes, change):
         _mark_own_speed(sweep, panel.axvline)
