@@ -121,3 +121,25 @@ def test_logarithmic_axes_have_room_for_their_numbers(natural):
     boxes.sort(key=lambda box: box.x0)
     for left, right in itertools.pairwise(boxes):
         assert left.x1 < right.x0
+
+
+def test_an_infinite_amplitude_does_not_hide_the_rest():
+    """A mode without damping: what stands at its critical speed is no number."""
+    sweep = made(1e-4)
+    critical = next(c for c in sweep.critical["isolated"] if c.order == 1.0)
+    undamped = dataclasses.replace(critical, mode=dataclasses.replace(critical.mode, damping=0.0))
+    at = int(np.argmin(np.abs(FACTOR - critical.factor)))
+    factor = FACTOR.copy()
+    factor[at] = critical.factor
+    rates = {mount: rate.copy() for mount, rate in sweep.bus_rate.items()}
+    rates["isolated"][at, 0, sweep.orders.index(critical.order), 0] = 1e8
+    endless = dataclasses.replace(
+        sweep,
+        factor=factor,
+        bus_rate=rates,
+        critical={"isolated": (undamped,), "rigid": ()},
+    )
+    drawn = sweep_figures(endless, "endless")["speeds"].axes[0]
+    assert drawn.get_ylim()[1] == pytest.approx(2e3 * np.rad2deg(1e-4) * 1.44)
+    line = next(each for each in drawn.lines if "order 1, with platform" in str(each.get_label()))
+    assert np.isnan(line.get_ydata()).sum() == 1

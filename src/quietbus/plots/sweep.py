@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 RPM = 30.0 / np.pi
 HERTZ = 0.5 / np.pi
 WIDE = 10.0  # times the slowest mode: a frequency axis longer than this is logarithmic
+UNDAMPED = 1e-8  # of critical: a mode damped less has no steady amplitude
+ENDLESS = 1e6  # times the usual amplitude
 LEAST_SPLIT = 0.01  # [%]
 DECADES = 7.0  # of amplitude that colours tell apart
 NO_JITTER = f"no jitter: the rotors shake the bus by less than {NOISE:g} deg/s at every speed"
@@ -121,8 +123,8 @@ def _draw_bearings(axes: Axes, sweep: SpeedSweep, shown: np.ndarray) -> np.ndarr
 def waterfall(sweep: SpeedSweep, name: str) -> Figure:
     """Amplitude of every line by frequency and speed, on both mounts, with the modes."""
     figure = new_figure(7.4, f"Bus rate by frequency and rotor speed ({name})")
-    sizes = {mount: np.rad2deg(sweep.by_order(mount)) for mount in LINES}
-    highest = max(float(size.max(initial=0.0)) for size in sizes.values())
+    sizes = {mount: _finite(sweep, mount) for mount in LINES}
+    highest = max(float(np.nanmax(size, initial=0.0)) for size in sizes.values())
     if highest < NOISE:
         explain(figure.subplots(), NO_JITTER)
         return figure
@@ -170,8 +172,8 @@ def waterfall(sweep: SpeedSweep, name: str) -> Figure:
 def speeds(sweep: SpeedSweep, name: str) -> Figure:
     """Amplitude of every order over rotor speed, on both mounts."""
     figure = new_figure(6.0, f"Bus rate over rotor speed ({name})")
-    sizes = {mount: np.rad2deg(sweep.by_order(mount)) for mount in LINES}
-    highest = max(float(size.max(initial=0.0)) for size in sizes.values())
+    sizes = {mount: _finite(sweep, mount) for mount in LINES}
+    highest = max(float(np.nanmax(size, initial=0.0)) for size in sizes.values())
     if highest < NOISE:
         explain(figure.subplots(), NO_JITTER)
         return figure
@@ -196,7 +198,9 @@ def speeds(sweep: SpeedSweep, name: str) -> Figure:
         axes.set_ylabel(f"about {AXES[i]}\n[{unit}]")
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         _mark_own_speed(sweep, axes.axvline)
-    least = np.concatenate([factor * size[shown].min(axis=(1, 2)) for size in sizes.values()])
+    least = np.concatenate(
+        [factor * np.nanmin(size[shown], axis=(1, 2), initial=np.inf) for size in sizes.values()]
+    )
     start = RPM * sweep.speed[shown][0]
     if np.any(least > 0.0):
         panels[0].set_xlim(max(start, 1e-3 * RPM * sweep.speed[-1]), RPM * sweep.speed[-1])
@@ -204,6 +208,22 @@ def speeds(sweep: SpeedSweep, name: str) -> Figure:
     panels[-1].set_xlabel("rotor speed [rpm]")
     share_legend(figure, panels[0])
     return figure
+
+
+def _finite(sweep: SpeedSweep, mount: str) -> np.ndarray:
+    """Sum of the rotors' amplitudes (speed, order, axis) [deg/s], NaN where they are infinite.
+
+    On a mode that nothing damps, not even the attitude loop, rounding over rounding is computed.
+    """
+    size = np.rad2deg(sweep.by_order(mount))
+    usual = np.median(size, axis=0)
+    for critical in sweep.critical[mount]:
+        if abs(critical.mode.damping) < UNDAMPED:
+            o = sweep.orders.index(critical.order)
+            there = np.isclose(sweep.factor, critical.factor, rtol=1e-9, atol=0.0)
+            there &= np.any(size[:, o] > ENDLESS * usual[o], axis=1)
+            size[there, o] = np.nan
+    return size
 
 
 def _floor(sweep: SpeedSweep, sizes: dict[str, np.ndarray], highest: float) -> float:
