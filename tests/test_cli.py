@@ -199,7 +199,14 @@ def test_coarse_output_is_told(command, tmp_path):
 
 def test_help_and_import_do_not_load_heavy_modules():
     """What makes `quietbus --help` answer at once."""
-    code = "import sys, quietbus, quietbus.cli; print(*sys.modules)"
+    code = """
+import sys, quietbus, quietbus.cli
+sys.argv = ["quietbus", "--help"]
+try:
+    quietbus.cli.main()
+finally:
+    print(*sys.modules)
+"""
     loaded = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.split()

@@ -71,11 +71,13 @@ FolderOption = Annotated[Path, typer.Option("-o", "--output", help="Folder for t
 def main() -> None:
     """Entry point: one clear message for bad input, no traceback; Ctrl-C ends with status 1."""
     signal.signal(signal.SIGINT, _on_interrupt)
-    from quietbus.scenario import ScenarioError
-
     try:
         app()
-    except (ScenarioError, _BadInput) as error:
+    except Exception as error:
+        from quietbus.scenario import ScenarioError  # here, so that --help need not load it
+
+        if not isinstance(error, ScenarioError | _BadInput):
+            raise
         told = _Asked.told(error) if isinstance(error, ScenarioError) else error
         print(f"quietbus: {told}", file=sys.stderr)
         sys.exit(BAD_INPUT)
