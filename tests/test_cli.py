@@ -92,6 +92,9 @@ def test_init_writes_a_scenario_that_works_and_keeps_what_is_there(command, tmp_
         (["simulate", "zhang2012", "--mount", "rigid", "--joint-forces"], "--joint-forces"),
         (["simulate", "zhang2012", "-o", "."], ".: is a folder"),
         (["simulate", "zhang2012", "-o", "/proc/run.nc"], "/proc/run.nc: cannot be written"),
+        (["simulate", "zhang2012", "--duration", "5 m"], "zhang2012 with --duration: simulation."),
+        (["jitter", "zhang2012", "--gimbal-angles", "1"], "zhang2012 with --gimbal-angles: clus"),
+        (["analyze", "zhang2012", "-o", __file__], "is a file; expected the name of a folder"),
         (["compare", "zhang2012", "-o", "/proc/none"], "/proc/none: cannot be made"),
         (["compare", "zhang2012", "-o", "/proc"], "/proc: cannot be written"),
         (["plot", "nothing.nc"], "nothing.nc: no such file"),
@@ -106,6 +109,26 @@ def test_bad_input_ends_with_status_2_and_one_message(command, arguments, messag
     assert message in err
     assert out == ""
     assert "Traceback" not in err
+
+
+def test_what_is_found_wrong_before_a_run_names_file_and_line(command, tmp_path):
+    """The scenario itself is fine; what it declares needs another output rate."""
+    path = short(
+        tmp_path,
+        **{
+            "name: zhang2012": "name: other",
+            "    static_imbalance:": "    disturbance: {orders: [{order: 8, radial_force: 1e-6}]}\n"
+            "    static_imbalance:",
+        },
+    )
+    status, out, err = command("simulate", path)
+    lines = (tmp_path / "my.yaml").read_text().splitlines()
+    line = next(i for i, text in enumerate(lines, 1) if "output_rate" in text)
+    assert status == 2
+    assert f"{path}: simulation.output_rate (line {line}): expected at least 2048 Hz" in err
+    assert out == ""
+    _, _, err = command("simulate", path, "--output-rate", "400 Hz")
+    assert f"{path} with --output-rate: simulation.output_rate: expected at least 2048 Hz" in err
 
 
 def test_bad_scenario_names_file_line_field_and_what_was_expected(command, tmp_path):
@@ -176,7 +199,14 @@ def test_coarse_output_is_told(command, tmp_path):
 
 def test_help_and_import_do_not_load_heavy_modules():
     """What makes `quietbus --help` answer at once."""
-    code = "import sys, quietbus, quietbus.cli; print(*sys.modules)"
+    code = """
+import sys, quietbus, quietbus.cli
+sys.argv = ["quietbus", "--help"]
+try:
+    quietbus.cli.main()
+finally:
+    print(*sys.modules)
+"""
     loaded = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.split()

@@ -10,6 +10,7 @@ import quietbus as qb
 from quietbus import cli
 from quietbus.analysis.jitter import KINDS, combine
 from quietbus.jitter_study import jitter_of_designs, worst_case_norm
+from quietbus.tables import jitter_tables
 
 
 @pytest.fixture(scope="module")
@@ -209,6 +210,17 @@ def test_command_prints_tables_and_draws(tmp_path, capsys):
         assert words in out
     assert (tmp_path / "budget.png").stat().st_size > 10_000
     assert json.loads((tmp_path / "jitter.json").read_text())["axes"] == ["x", "y", "z"]
+
+
+def test_critical_speeds_are_told_of_wheels_too(numbers):
+    """Wheels have no gimbal angles to be worst at, but speeds to keep away from."""
+    *_, table = jitter_tables(numbers | {"worst": {}, "gimbal_angle_deg": []})
+    assert table.title.startswith("Critical speeds on the platform, up to 7200 rpm")
+    assert table.row_count > 0
+    assert [each.title.split(":")[0] for each in jitter_tables(numbers)][-2:] == [
+        "Worst gimbal angles",
+        "Critical speeds on the platform, gimbals held, up to 7200 rpm",
+    ]
 
 
 @pytest.mark.parametrize(

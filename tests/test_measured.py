@@ -96,9 +96,12 @@ def test_netcdf_is_read_with_its_units(tmp_path):
         ("600, 1", "0, 1", "speed: expected numbers above 0, got 0"),
         ("10, 20, 30", "10, 30, 20", "frequency: expected ascending values, got 20 after 30"),
         ("30, 40", "30, 50", "evenly spaced"),
-        ("5, 6, 7", "5, -6, 7", "numbers of at least 0, got -6 at speed 1200 and frequency 20"),
+        ("5, 6, 7", "5, -6, 7", r"column 3 \(line 8\): expected a number of at least 0, got '-6'"),
+        ("5, 6, 7", "5, nan, 7", r"column 3 \(line 8\): .* at least 0, got 'nan'"),
         ("5, 6, 7", "5, 7", r"line 8: expected 5 cells, got 4"),
-        ("5, 6, 7", "5, x, 7", r"column 3 \(line 8\): expected a number, got 'x'"),
+        ("5, 6, 7", "5, x, 7", r"column 3 \(line 8\): expected a number of at least 0, got 'x'"),
+        ("window: hann", "windw: hann", r"line 4: unknown key 'windw'; did you mean 'window'"),
+        ("window: hann", "unit: N", r"unit \(line 4\): this key appears twice"),
         ("1800, 9, 10, 11, 12\n", "", "speed: expected at least three, got 2"),
     ],
 )
@@ -119,12 +122,22 @@ def test_other_wrong_files_are_told(put, tmp_path):
         qb.read_waterfall(put(LONG + "\nradial_torque,1,5,3"))
     with pytest.raises(MapError, match="unknown column 'amount'"):
         qb.read_waterfall(put(LONG.replace("value", "amount")))
+    with pytest.raises(MapError, match=r"value \(line \d+\): expected a number of at least 0"):
+        qb.read_waterfall(put(LONG + "\nradial_torque,1,20,inf"))
+    with pytest.raises(MapError, match="is a folder; expected the file of a map"):
+        qb.read_waterfall(tmp_path)
     wrong = netcdf(tmp_path / "a.nc", np.ones((3, 4)), np.arange(4.0), name="thrust")
     with pytest.raises(MapError, match=r"expected variables among radial_force.*got thrust"):
         qb.read_waterfall(wrong)
     wrong = netcdf(tmp_path / "b.nc", np.ones((3, 4)), np.arange(4.0), units="N*m")
     with pytest.raises(MapError, match="or an amplitude in N, got"):
         qb.read_waterfall(wrong)
+
+
+def test_a_long_file_of_something_else_is_told_in_a_few_lines(put):
+    with pytest.raises(MapError, match="and 994 problems more") as told:
+        qb.read_waterfall(put("what\n" + "ever\n" * 999))
+    assert len(str(told.value).splitlines()) == 6
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NoReturn
 
 import typer
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from quietbus.jitter_study import JitterStudy
-    from quietbus.scenario import Scenario
+    from quietbus.scenario import Scenario, ScenarioError
     from quietbus.study import Study
     from quietbus.validate import Check
 
@@ -71,12 +71,15 @@ FolderOption = Annotated[Path, typer.Option("-o", "--output", help="Folder for t
 def main() -> None:
     """Entry point: one clear message for bad input, no traceback; Ctrl-C ends with status 1."""
     signal.signal(signal.SIGINT, _on_interrupt)
-    from quietbus.scenario import ScenarioError
-
     try:
         app()
-    except (ScenarioError, _BadInput) as error:
-        print(f"quietbus: {error}", file=sys.stderr)
+    except Exception as error:
+        from quietbus.scenario import ScenarioError  # here, so that --help need not load it
+
+        if not isinstance(error, ScenarioError | _BadInput):
+            raise
+        told = _Asked.told(error) if isinstance(error, ScenarioError) else error
+        print(f"quietbus: {told}", file=sys.stderr)
         sys.exit(BAD_INPUT)
 
 
@@ -111,6 +114,31 @@ def _keeping_results() -> Iterator[None]:
 
 class _BadInput(Exception):
     """Something that the user asked for and that cannot be; the message says what."""
+
+
+class _Asked:
+    """The scenario in work, so that what is found wrong with it later is told of its file too."""
+
+    file: str = ""
+    names: tuple[str, ...] = ()  # under which it tells of its problems
+    options: ClassVar[dict[str, str]] = {}  # of the command line, by the path that each has set
+
+    @classmethod
+    def told(cls, error: ScenarioError) -> ScenarioError:
+        """With the file and its lines, or with the options in whose values the fault lies."""
+        from quietbus.scenario import ScenarioError, located
+        from quietbus.scenario.errors import dotted
+
+        if error.source not in cls.names:
+            return error
+        by_option = [
+            option
+            for path, option in cls.options.items()
+            if any(dotted(problem.path).startswith(path) for problem in error.problems)
+        ]
+        if by_option:
+            return ScenarioError(f"{cls.file} with {', '.join(by_option)}", error.problems)
+        return located(error, cls.file)
 
 
 @app.command()
@@ -615,6 +643,7 @@ def _at_angles(scenario: Scenario, gimbal_angles: str | None) -> Scenario:
     if gimbal_angles is None:
         return scenario
     angles = [angle.strip() for angle in gimbal_angles.split(",")]
+    _Asked.options = _Asked.options | {"cluster.gimbal_angles": "--gimbal-angles"}
     return scenario.with_overrides({"cluster.gimbal_angles": angles})
 
 
@@ -624,14 +653,16 @@ def _load(
     """The scenario with the command line's values instead of its own."""
     from quietbus.scenario import load_scenario
 
-    overrides = {
-        "isolator.mount": mount and mount.value,
-        "simulation.duration": duration,
-        "simulation.output_rate": output_rate,
+    given = {
+        "isolator.mount": ("--mount", mount and mount.value),
+        "simulation.duration": ("--duration", duration),
+        "simulation.output_rate": ("--output-rate", output_rate),
     }
-    return load_scenario(name).with_overrides(
-        {key: value for key, value in overrides.items() if value is not None}
-    )
+    given = {path: said for path, said in given.items() if said[1] is not None}
+    scenario = load_scenario(name)
+    _Asked.file, _Asked.names = name, (scenario.name, f"{scenario.name} with overrides")
+    _Asked.options = {path: option for path, (option, _) in given.items()}
+    return scenario.with_overrides({path: value for path, (_, value) in given.items()})
 
 
 def _import_heavy() -> None:
@@ -751,6 +782,8 @@ def _check_file(file: Path) -> None:
 def _make_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise _BadInput(f"{folder}: is a file; expected the name of a folder") from None
     except OSError as error:
         raise _BadInput(f"{folder}: cannot be made: {error.strerror}") from None
     _check_writable(folder, folder)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import csv
+import difflib
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,7 @@ _PSD = {
 }
 _AMPLITUDE = {"force": Quantity("an amplitude", "N"), "torque": Quantity("an amplitude", "N*m")}
 _EVEN = 1e-3  # relative difference of steps of frequency
+_TOLD = 5  # problems of a file
 _SNAP = 2e-3  # orders as near to a whole number are taken as that
 
 
@@ -51,7 +53,8 @@ def read_waterfall(path: str | os.PathLike[str]) -> xr.Dataset:
     """
     file = Path(path)
     if not file.is_file():
-        raise MapError(str(file), [Problem("no such file")])
+        what = "is a folder; expected the file of a map" if file.is_dir() else "no such file"
+        raise MapError(str(file), [Problem(what)])
     return _read_netcdf(file) if _is_netcdf(file) else _read_csv(file)
 
 
@@ -71,8 +74,11 @@ class _Check:
         self.problems.append(Problem(message, (column,) if column else (), line))
 
     def raise_any(self) -> None:
+        """Tell what is wrong, of a long file the first problems only: all have one cause."""
         if self.problems:
-            raise MapError(str(self.file), self.problems)
+            told, left = self.problems[:_TOLD], len(self.problems) - _TOLD
+            more = [Problem(f"and {left} problems more")] if left > 0 else []
+            raise MapError(str(self.file), [*told, *more])
 
     def factor(self, quantity: Quantity, unit: str, where: str) -> float | None:
         """SI per unit, or None if the unit is another quantity's."""
@@ -93,7 +99,8 @@ class _Check:
         """One map in SI, or None if it has problems."""
         before = len(self.problems)
         if name not in KINDS:
-            self.wrong(f"expected one of {', '.join(KINDS)}, got {shown(name)}", "component")
+            got = shown(name or None)
+            self.wrong(f"expected one of {', '.join(KINDS)}, got {got}", "component")
             return None
         window = about.get("window", "hann")
         if window not in WINDOWS:
@@ -206,7 +213,8 @@ def _read_netcdf(file: Path) -> xr.Dataset:
         with xr.open_dataset(file) as stored:
             data = stored.load()
     except (OSError, ValueError, KeyError) as error:
-        raise MapError(str(file), [Problem(f"not a NetCDF file ({error})")]) from None
+        why = str(error).splitlines()[0].partition(". ")[0]
+        raise MapError(str(file), [Problem(f"not a whole NetCDF file ({why})")]) from None
     wanted = [name for name in data.data_vars if name in KINDS]
     for name in ("speed", "frequency"):
         if name not in data.coords:
@@ -249,9 +257,13 @@ def _read_csv(file: Path) -> xr.Dataset:
     rows: list[tuple[int, list[str]]] = []
     for number, line in enumerate(lines, 1):
         if line.startswith("#"):
-            key, colon, value = line[1:].partition(":")
-            if colon and key.strip() in KEYS:
-                about[key.strip()] = value.strip()
+            key, colon, value = (part.strip() for part in line[1:].partition(":"))
+            if colon and key in KEYS:
+                if key in about:
+                    check.wrong("this key appears twice", key, number)
+                about[key] = value
+            elif colon and (close := difflib.get_close_matches(key.lower(), KEYS, 1, 0.8)):
+                check.wrong(f"unknown key {shown(key)}; did you mean '{close[0]}'?", line=number)
         elif line.strip():
             cells = next(csv.reader([line], delimiter=";" if ";" in line else ","))
             rows.append((number, [cell.strip() for cell in cells]))
@@ -266,14 +278,18 @@ def _read_csv(file: Path) -> xr.Dataset:
     return xr.merge([each for each in maps if each is not None])
 
 
-def _numbers(check: _Check, cells: Sequence[str], line: int) -> list[float]:
+def _numbers(check: _Check, cells: Mapping[str, str], line: int) -> list[float]:
+    """Cells by column as numbers of at least 0, which speeds, frequencies and values are."""
     found = []
-    for column, cell in enumerate(cells, 1):
+    for column, cell in cells.items():
         try:
-            found.append(float(cell))
+            number = float(cell)
         except ValueError:
-            check.wrong(f"expected a number, got {shown(cell)}", f"column {column}", line)
-            found.append(math.nan)
+            number = math.nan
+        if not 0.0 <= number < math.inf:
+            what = f"expected a number of at least 0, got {shown(cell)}"
+            check.wrong(what, column, line)
+        found.append(number)
     return found
 
 
@@ -281,13 +297,14 @@ def _matrix(
     check: _Check, rows: list[tuple[int, list[str]]], about: dict[str, str]
 ) -> xr.DataArray | None:
     line, head = rows[0]
-    frequency = np.array(_numbers(check, head[1:], line))
+    columns = [f"column {i}" for i in range(1, len(head) + 1)]
+    frequency = np.array(_numbers(check, dict(zip(columns[1:], head[1:], strict=True)), line))
     speed, values = [], []
     for number, cells in rows[1:]:
         if len(cells) != len(head):
             check.wrong(f"expected {len(head)} cells, got {len(cells)}", line=number)
             continue
-        first, *rest = _numbers(check, cells, number)
+        first, *rest = _numbers(check, dict(zip(columns, cells, strict=True)), number)
         speed.append(first)
         values.append(rest)
     check.raise_any()
@@ -315,7 +332,7 @@ def _long(
             continue
         row = dict(zip(head, cells, strict=True))
         component = row.get("component") or about.get("component", "")
-        speed, frequency, value = _numbers(check, [row[name] for name in known[1:]], number)
+        speed, frequency, value = _numbers(check, {name: row[name] for name in known[1:]}, number)
         place = points.setdefault(component, {})
         if (speed, frequency) in place:
             check.wrong(

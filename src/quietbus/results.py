@@ -449,6 +449,8 @@ def summarize(run: xr.Dataset) -> Summary:
         rms = run["bus_rate_jitter_rms"].to_numpy()[last].max(axis=0)
         slow = np.abs(run["bus_rate"].to_numpy()[last]).max(axis=0)
         note = f"envelope from t = {time[last][0]:.4g} s to {time[-1]:.4g} s"
+        if "bus_rate_noise_rms" in run:
+            note += "; the rotors' noise is in the RMS alone"
     elif not aliasing(scenario_of(run)):
         try:
             rest = residual(time, run["bus_rate"].to_numpy())

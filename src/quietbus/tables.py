@@ -326,29 +326,36 @@ def jitter_tables(numbers: Mapping[str, Any]) -> Iterator[Table]:
     parts.caption = f"parts below {NOISE:g} deg/s left out"
     yield parts
 
-    if not numbers["worst"]:
-        return
+    if numbers["worst"]:
+        yield _worst_angles(numbers["worst"])
+    if numbers["sweep"] is not None:
+        yield critical_table(numbers["sweep"], "gimbals held, " if numbers["worst"] else "")
+
+
+def _worst_angles(found_worst: Mapping[str, Any]) -> Table:
     worst = _titled("Worst gimbal angles: norm over axes of the sum of all amplitudes, in deg/s")
     for column in ("mount", "here", "worst", "at gimbal angles, deg"):
         worst.add_column(column, justify="right")
-    for mount, found in numbers["worst"].items():
+    for mount, found in found_worst.items():
         worst.add_row(
             mount,
             f"{found['bus_rate_norm_here_deg_s']:.3e}",
             f"{found['bus_rate_norm_deg_s']:.3e}",
             ", ".join(f"{angle:.1f}" for angle in found["gimbal_angle_deg"]),
         )
-    yield worst
-    if numbers["sweep"] is not None:
-        yield critical_table(numbers["sweep"])
+    return worst
 
 
-def critical_table(sweep: Mapping[str, Any]) -> Table:
-    """Speeds at which an order that shakes the bus meets a mode of platform or rotor."""
+def critical_table(sweep: Mapping[str, Any], held: str) -> Table:
+    """Speeds at which an order that shakes the bus meets a mode of platform or rotor.
+
+    Args:
+        held: "gimbals held, " if there are any.
+    """
     found = sweep["isolated"]["critical_speeds"] + sweep["isolated"]["bearing_critical_speeds"]
     found = sorted(found, key=lambda critical: critical["factor"])
     most = sweep["speed_rpm"][-1]
-    table = _titled(f"Critical speeds on the platform, gimbals held, up to {most:.5g} rpm")
+    table = _titled(f"Critical speeds on the platform, {held}up to {most:.5g} rpm")
     columns = ("speed\nrpm", "order", "frequency\nHz", "damping\n-", "Q\n-", "bus rate\ndeg/s")
     for column in columns:
         table.add_column(column, justify="right")

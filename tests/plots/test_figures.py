@@ -10,8 +10,8 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from quietbus.plots import compare_figures, run_figures, save_figures
-from quietbus.plots.signals import euler_angles, jitter, rate_spectrum
-from quietbus.plots.style import draw_line, envelope, scaled
+from quietbus.plots.signals import euler_angles, jitter, rate_spectrum, rotor_frequencies
+from quietbus.plots.style import draw_line, envelope, new_figure, scaled, share_legend, style
 from quietbus.results import VARIABLES
 from quietbus.scenario import load_scenario
 
@@ -189,3 +189,30 @@ def test_small_values_are_shown_in_powers_of_a_thousand(peak, factor, unit):
     got = scaled(peak, "N")
     assert got[0] == pytest.approx(factor)
     assert got[1] == unit
+
+
+def test_rotors_are_marked_where_they_turn_at_the_end():
+    """Wheels that changed their speed are no longer where the scenario has them."""
+    run = synthetic(count=4000)
+    speed = 2 * np.pi * np.outer(np.linspace(0.0, 1.0, 4000), [20.0, -60.0, 40.0, 0.0])
+    run["rotor_speed"] = run["rotor_torque"] = (("time", "cmg"), speed)
+    last = run.isel(time=slice(2000, None))  # what its spectrum is from
+    spins = np.abs(last["rotor_speed"].to_numpy()) / (2 * np.pi)
+    expected = pytest.approx((spins[spins > 0.0].min(), 60.0), rel=1e-3)
+    assert rotor_frequencies(run) == expected
+    assert "rotors 10" in " ".join(texts(run_figures(run)["spectrum"]))
+
+
+@pytest.mark.parametrize("words", ["ab", "order 1, without platform (rigid mount)", "x" * 90])
+def test_a_legend_stays_inside_the_picture(words):
+    with style():
+        figure = new_figure(3.0, "title")
+        axes = figure.subplots()
+        for i in range(7):
+            axes.plot([0, 1], [i, i], label=f"{words} {i}")
+        share_legend(figure, axes)
+    figure.draw_without_rendering()
+    box = figure.legends[0].get_window_extent()
+    assert len(words) > 80 or (box.x0 >= 0.0 and box.x1 <= figure.bbox.x1)
+    columns = figure.legends[0]._ncols
+    assert columns == {2: 7, 39: 2, 90: 1}[len(words)]

@@ -132,6 +132,18 @@ def test_jitter_over_time_is_drawn_per_axis_in_the_unit_of_its_label(label, shar
         assert low < values.min() < values.max() < high
 
 
+def test_noise_of_the_rotors_is_drawn_beside_the_lines():
+    run = synthetic("rigid")
+    noise = np.full((run.sizes["time"], 3), [1e-5, 2e-5, 3e-5])
+    run["bus_rate_noise_rms"] = (("time", "axis"), noise)
+    _, *panels, _ = run_figures(run)["rates"].axes
+    factor = prefix(panels[0].get_ylabel())
+    for i, axes in enumerate(panels):
+        _, values = line(axes, "RMS of the rotors' noise")
+        assert factor * values == pytest.approx(np.rad2deg(noise[:, i]))
+        assert axes.get_ylim()[1] > values.max()
+
+
 def test_the_estimated_error_is_drawn_in_percent_and_its_largest_value_told():
     axes = run_figures(synthetic("rigid"))["rates"].axes[-1]
     time, values = np.array(axes.lines[0].get_data())

@@ -1,5 +1,8 @@
 """Pictures of a sweep show the frequencies and amplitudes that were put in, and what is not."""
 
+import dataclasses
+import itertools
+
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
@@ -88,3 +91,55 @@ def test_without_jitter_the_pictures_say_so():
     for name in ("waterfall", "speeds"):
         text = " ".join(quiet[name].axes[0].texts[0].get_text().split())
         assert text == NO_JITTER
+
+
+def test_amplitudes_fill_the_axis(figures):
+    """Colours and heights start at the least that is drawn, not decades below it."""
+    least = np.rad2deg(1e-5) * FACTOR[1] ** 2  # on the platform
+    bottom, top = figures["speeds"].axes[0].get_ylim()
+    assert bottom == pytest.approx(1e3 * least)  # in 10^-3 deg/s
+    assert top == pytest.approx(2e3 * np.rad2deg(1e-4) * 1.44)
+    rays = next(c for c in figures["waterfall"].axes[0].collections)
+    assert rays.norm.vmin == pytest.approx(least)
+
+
+@pytest.mark.parametrize("natural", [5.0, 60.0, 90.0])
+def test_logarithmic_axes_have_room_for_their_numbers(natural):
+    sweep = made(1e-4)
+    slow = dataclasses.replace(sweep, modes={"isolated": plant(natural), "rigid": plant(1.0)})
+    figure = sweep_figures(slow, "slow")["waterfall"]
+    figure.draw_without_rendering()
+    axes = figure.axes[-2]
+    assert axes.get_xscale() == "log"
+    low, high = axes.get_xlim()
+    boxes = [
+        label.get_window_extent()
+        for label in axes.get_xticklabels(which="both")
+        if label.get_text() and low <= label.get_position()[0] <= high
+    ]
+    assert len(boxes) >= 2
+    boxes.sort(key=lambda box: box.x0)
+    for left, right in itertools.pairwise(boxes):
+        assert left.x1 < right.x0
+
+
+def test_an_infinite_amplitude_does_not_hide_the_rest():
+    """A mode without damping: what stands at its critical speed is no number."""
+    sweep = made(1e-4)
+    critical = next(c for c in sweep.critical["isolated"] if c.order == 1.0)
+    undamped = dataclasses.replace(critical, mode=dataclasses.replace(critical.mode, damping=0.0))
+    at = int(np.argmin(np.abs(FACTOR - critical.factor)))
+    factor = FACTOR.copy()
+    factor[at] = critical.factor
+    rates = {mount: rate.copy() for mount, rate in sweep.bus_rate.items()}
+    rates["isolated"][at, 0, sweep.orders.index(critical.order), 0] = 1e8
+    endless = dataclasses.replace(
+        sweep,
+        factor=factor,
+        bus_rate=rates,
+        critical={"isolated": (undamped,), "rigid": ()},
+    )
+    drawn = sweep_figures(endless, "endless")["speeds"].axes[0]
+    assert drawn.get_ylim()[1] == pytest.approx(2e3 * np.rad2deg(1e-4) * 1.44)
+    line = next(each for each in drawn.lines if "order 1, with platform" in str(each.get_label()))
+    assert np.isnan(line.get_ydata()).sum() == 1

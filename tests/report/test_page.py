@@ -13,6 +13,7 @@ import pytest
 import quietbus as qb
 from quietbus import cli
 from quietbus.report import report_page, write_report
+from quietbus.report.harmonic import harmonic_pictures
 from quietbus.results import summarize
 from quietbus.validate import Check
 from report.runs import harmonic, synthetic
@@ -77,6 +78,17 @@ def test_status_mount_and_method_come_first():
     for words in (">complete</span>", "<dd>isolated</dd>", "<dd>direct</dd>", "2 s", "1000 Hz"):
         assert words in head
     assert "not complete" not in head
+    assert "<dt>CMGs</dt>" in head
+
+
+def test_frequencies_of_lines_are_those_of_the_speeds_at_the_end():
+    run = harmonic()
+    speed = np.outer(np.linspace(1.0, 2.0, run.sizes["time"]), [100.0, 200.0, -300.0, 400.0])
+    run["rotor_speed"] = (("time", "cmg"), speed)
+    run["rotor_angle"] = (("time", "cmg"), 0.0 * speed)
+    bars = next(p for p in harmonic_pictures(run) if p.name == "lines").content.data[:4]
+    for bar, last in zip(bars, np.abs(speed[-1]) / (2 * np.pi), strict=True):
+        assert np.array(bar.customdata) == pytest.approx(last * np.array([1, 2]))
 
 
 @pytest.mark.parametrize("status", ["interrupted", "stopped"])

@@ -143,6 +143,7 @@ TORQUE = "broadband.radial_torque."
             spectrum(sample_rate=18.0),
             TORQUE + "frequency[1]: expected at most 9 Hz, the Nyquist frequency of the table's",
         ),
+        ({"table": 3}, "cluster.rotor.disturbance.table: expected the name of a file, got 3"),
         ({"seed": -1}, "seed: expected a whole number of at least 0, got -1"),
     ],
 )

@@ -136,6 +136,14 @@ REFUSED = [
         "requirements[0].end (line {}): expected a time after start (5 s), got 4",
     ),
     (
+        "'RPE(camera, window = 1 s, window = 2 s) <= 1 arcsec'",
+        "requirements[0] (line {}): expected each key once, not window twice, got 'RPE(camera,",
+    ),
+    (
+        "'RPE(camera, window = 1 s, metric = MPE) <= 1 arcsec'",
+        "requirements[0] (line {}): expected each key once, not metric twice, got 'RPE(camera,",
+    ),
+    (
         "RPE of camera below 1",
         "requirements[0] (line {}): expected a mapping with the key metric, or a text like 'RPE(camera, window = 5 ms, confidence = 0.997) <= 0.1 arcsec', got 'RPE of camera below 1'",
     ),

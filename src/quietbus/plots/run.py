@@ -116,7 +116,11 @@ def rates_and_envelope(run: xr.Dataset) -> Figure:
     draw_lines(whole, time, degrees(run, "bus_rate"), AXES)
     whole.set(ylabel="rate [deg/s]", title="slow motion")
     whole.legend(ncols=3)
-    values = {name: degrees(run, f"bus_rate_jitter_{name}") for name in COMBINED}
+    looks = dict(COMBINED)
+    values = {name: degrees(run, f"bus_rate_jitter_{name}") for name in looks}
+    if "bus_rate_noise_rms" in run:
+        looks["noise"] = ("RMS of the rotors' noise", {"linewidth": 0.9, "linestyle": DASHES[2]})
+        values["noise"] = degrees(run, "bus_rate_noise_rms")
     largest = max(float(each.max()) for each in values.values())
     if largest < NOISE:
         explain(figure.add_subplot(grid[1:, :]), NO_JITTER)
@@ -126,7 +130,7 @@ def rates_and_envelope(run: xr.Dataset) -> Figure:
     first = None
     for i, axis in enumerate(AXES):
         first = panel = figure.add_subplot(grid[1, i], sharey=first)
-        for name, (label, look) in COMBINED.items():
+        for name, (label, look) in looks.items():
             line = {"color": COLOURS[i] if name == "envelope" else "0.25", "label": label} | look
             draw_line(panel, time, factor * values[name][:, i], **line)
         log_scale(panel, 0.5 * factor * float(positive.min()), 2.0 * factor * largest)
@@ -301,11 +305,13 @@ def _mark_rotors(axes: Axes, run: xr.Dataset, limits: tuple[float, float]) -> No
     slowest, fastest = rotor_frequencies(run)
     lines = list(axes.lines)
     speeds = f"{slowest:.4g}" if np.isclose(slowest, fastest) else f"{slowest:.4g}–{fastest:.4g}"
+    reached = limits[0]
     for order in range(1, 5):
         start, end = order * slowest, order * fastest
-        if not limits[0] < start <= end < limits[1]:
+        if not reached < start <= end < limits[1]:  # bands that overlap tell nothing
             break
-        axes.axvspan(start, end, color="0.7", linewidth=0.8, zorder=0)
+        reached = end
+        axes.axvspan(start, end, facecolor="0.94", edgecolor="0.7", linewidth=0.8, zorder=0)
         first = order == 1
         axes.annotate(
             f"rotors {speeds} Hz" if first else f"{order}×",

@@ -63,10 +63,23 @@ def euler_angles(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
 
 
 def rotor_frequencies(run: xr.Dataset) -> tuple[float, float]:
-    """Slowest and fastest turning rotor [Hz]; zeros if none turns."""
-    speeds = [abs(unit.rotor.speed) for unit in scenario_of(run).cluster.placed() if unit.rotor]
+    """Slowest and fastest turning rotor [Hz]; zeros if none turns.
+
+    Of rotors whose speed changes, at the end of the run that its spectrum is from.
+    """
+    if "rotor_speed" in run:
+        time = run["time"].to_numpy()
+        last = time >= time[-1] - _spectrum_span(time)
+        speeds = np.abs(run["rotor_speed"].to_numpy()[last]).ravel().tolist()
+    else:
+        speeds = [abs(unit.rotor.speed) for unit in scenario_of(run).cluster.placed() if unit.rotor]
     turning = [speed / (2.0 * np.pi) for speed in speeds if speed] or [0.0]
     return min(turning), max(turning)
+
+
+def _spectrum_span(time: np.ndarray) -> float:
+    """Length [s] of the end of a run that its spectrum is from."""
+    return float(min(SPECTRUM, 0.5 * (time[-1] - time[0])))
 
 
 @dataclass(frozen=True)
@@ -114,7 +127,7 @@ def rate_spectrum(run: xr.Dataset) -> tuple[Spectrum, float]:
         ValueError: too few samples.
     """
     time = run["time"].to_numpy()
-    span = min(SPECTRUM, 0.5 * (time[-1] - time[0]))
+    span = _spectrum_span(time)
     last = time >= time[-1] - span
     lines = amplitude_spectrum(time[last], degrees(run, "bus_rate")[last])
     return Spectrum(lines.frequency[BLURRED:], lines.amplitude[BLURRED:]), span

@@ -113,7 +113,20 @@ def share_legend(figure: Figure, axes: Axes) -> None:
     """One legend below the figure for the lines of ``axes``."""
     handles, labels = axes.get_legend_handles_labels()
     if len(labels) > 1:
-        figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 8))
+        columns = _columns(labels, float(figure.get_figwidth()))
+        figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+
+
+def _columns(labels: Sequence[str], width: float) -> int:
+    """Columns of a legend, up to 8, that fit into ``width`` [in]."""
+    em = _RC["font.size"] / 72.0
+    beside = _RC["legend.handlelength"] + 0.8 + 2.0  # line, gap, distance of columns
+
+    def needed(columns: int) -> float:
+        parts = np.array_split(np.array([len(label) for label in labels]), columns)
+        return em * sum(beside + 0.55 * part.max() for part in parts)
+
+    return next((n for n in range(min(len(labels), 8), 1, -1) if needed(n) <= width), 1)
 
 
 def explain(axes: Axes, reason: str, columns: int = 70) -> None:

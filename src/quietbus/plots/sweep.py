@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from quietbus.plots.signals import AXES, LINES, NOISE
 from quietbus.plots.style import COLOURS, DASHES, explain, new_figure, scaled, share_legend, style
@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 RPM = 30.0 / np.pi
 HERTZ = 0.5 / np.pi
 WIDE = 10.0  # times the slowest mode: a frequency axis longer than this is logarithmic
+UNDAMPED = 1e-8  # of critical: a mode damped less has no steady amplitude
+ENDLESS = 1e6  # times the usual amplitude
+LEAST_SPLIT = 0.01  # [%]
 DECADES = 7.0  # of amplitude that colours tell apart
 NO_JITTER = f"no jitter: the rotors shake the bus by less than {NOISE:g} deg/s at every speed"
 
@@ -89,6 +92,8 @@ def campbell(sweep: SpeedSweep, name: str) -> Figure:
     _scale(axes, sweep, frequency, "rotor speed [rpm]", "damped frequency [Hz]", True)
     _name_rays(axes, sweep)
     change.set(xlabel=axes.get_xlabel(), ylabel="split by the\nmomentum [%]")
+    if np.abs(change.get_ylim()).max() < LEAST_SPLIT:  # rounding
+        change.set_ylim(-LEAST_SPLIT, LEAST_SPLIT)
     axes.set_xlabel("")
     for panel in (axes, change):
         _mark_own_speed(sweep, panel.axvline)
@@ -119,13 +124,13 @@ def _draw_bearings(axes: Axes, sweep: SpeedSweep, shown: np.ndarray) -> np.ndarr
 def waterfall(sweep: SpeedSweep, name: str) -> Figure:
     """Amplitude of every line by frequency and speed, on both mounts, with the modes."""
     figure = new_figure(7.4, f"Bus rate by frequency and rotor speed ({name})")
-    sizes = {mount: np.rad2deg(sweep.by_order(mount)) for mount in LINES}
-    highest = max(float(size.max(initial=0.0)) for size in sizes.values())
+    sizes = {mount: _finite(sweep, mount) for mount in LINES}
+    highest = max(float(np.nanmax(size, initial=0.0)) for size in sizes.values())
     if highest < NOISE:
         explain(figure.subplots(), NO_JITTER)
         return figure
     panels = figure.subplots(3, 2, sharex=True, sharey=True)
-    norm = LogNorm(highest * 10.0**-DECADES, highest)
+    norm = LogNorm(_floor(sweep, sizes, highest), highest)
     shown = sweep.factor > 0.0
     rpm = RPM * sweep.speed[shown]
     modes = _mode_frequencies(sweep)[shown]
@@ -168,8 +173,8 @@ def waterfall(sweep: SpeedSweep, name: str) -> Figure:
 def speeds(sweep: SpeedSweep, name: str) -> Figure:
     """Amplitude of every order over rotor speed, on both mounts."""
     figure = new_figure(6.0, f"Bus rate over rotor speed ({name})")
-    sizes = {mount: np.rad2deg(sweep.by_order(mount)) for mount in LINES}
-    highest = max(float(size.max(initial=0.0)) for size in sizes.values())
+    sizes = {mount: _finite(sweep, mount) for mount in LINES}
+    highest = max(float(np.nanmax(size, initial=0.0)) for size in sizes.values())
     if highest < NOISE:
         explain(figure.subplots(), NO_JITTER)
         return figure
@@ -190,11 +195,13 @@ def speeds(sweep: SpeedSweep, name: str) -> Figure:
             if sweep.excited("isolated")[sweep.orders.index(c.order)]:
                 at = RPM * c.factor * np.max(np.abs(sweep.rotor_speed))
                 axes.axvline(at, color="0.7", linewidth=0.8, zorder=0)
-        axes.set_ylim(factor * highest * 10.0**-DECADES, 2.0 * factor * highest)
+        axes.set_ylim(factor * _floor(sweep, sizes, highest), 2.0 * factor * highest)
         axes.set_ylabel(f"about {AXES[i]}\n[{unit}]")
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         _mark_own_speed(sweep, axes.axvline)
-    least = np.concatenate([factor * size[shown].min(axis=(1, 2)) for size in sizes.values()])
+    least = np.concatenate(
+        [factor * np.nanmin(size[shown], axis=(1, 2), initial=np.inf) for size in sizes.values()]
+    )
     start = RPM * sweep.speed[shown][0]
     if np.any(least > 0.0):
         panels[0].set_xlim(max(start, 1e-3 * RPM * sweep.speed[-1]), RPM * sweep.speed[-1])
@@ -236,6 +243,29 @@ def run_up_figure(runs: Mapping[str, RunUp], name: str) -> Figure:
         panels[-1].set_xlabel("rotor speed [rpm]")
         share_legend(figure, panels[0])
     return figure
+
+
+def _finite(sweep: SpeedSweep, mount: str) -> np.ndarray:
+    """Sum of the rotors' amplitudes (speed, order, axis) [deg/s], NaN where they are infinite.
+
+    On a mode that nothing damps, not even the attitude loop, rounding over rounding is computed.
+    """
+    size = np.rad2deg(sweep.by_order(mount))
+    usual = np.median(size, axis=0)
+    for critical in sweep.critical[mount]:
+        if abs(critical.mode.damping) < UNDAMPED:
+            o = sweep.orders.index(critical.order)
+            there = np.isclose(sweep.factor, critical.factor, rtol=1e-9, atol=0.0)
+            there &= np.any(size[:, o] > ENDLESS * usual[o], axis=1)
+            size[there, o] = np.nan
+    return size
+
+
+def _floor(sweep: SpeedSweep, sizes: dict[str, np.ndarray], highest: float) -> float:
+    """The least amplitude drawn: of the orders drawn, but not below what colours tell apart."""
+    drawn = np.concatenate([sizes[m][:, sweep.excited(m)].ravel() for m in LINES])
+    least = float(drawn[drawn > 0.0].min(initial=highest))
+    return min(max(least, highest * 10.0**-DECADES), 0.1 * highest)
 
 
 def _mode_frequencies(sweep: SpeedSweep) -> np.ndarray:
@@ -289,10 +319,17 @@ def _scale(
         low = 0.3 * slowest
         limits = {"speed": (most * low / highest, most), "frequency": (low, highest)}
         axes.set(xscale="log", yscale="log")
+        few = highest < 100.0 * low  # decades
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            axis.set_minor_formatter(FuncFormatter(_between_decades) if few else NullFormatter())
     names = ("speed", "frequency") if speed_along_x else ("frequency", "speed")
     axes.set(xlabel=x, ylabel=y, xlim=limits[names[0]], ylim=limits[names[1]])
+
+
+def _between_decades(value: float, _: object) -> str:
+    """Labels of 2 and 5 alone: there is no room for all digits."""
+    return f"{value:g}" if f"{value:e}"[0] in "25" else ""
 
 
 def _name_rays(axes: Axes, sweep: SpeedSweep) -> None:

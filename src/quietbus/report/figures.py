@@ -79,7 +79,11 @@ def _control(run: xr.Dataset) -> Drawing:
     measure = run["singularity_measure"].to_numpy()[:, None]
     caption = (
         "Attitude error and the torque that the controller commands, in the bus frame; how far "
-        "the cluster is from a singular set of gimbal angles, where the measure is zero."
+        + (
+            "the cluster is from a singular set of gimbal angles, where the measure is zero."
+            if has_gimbals(run)
+            else "the wheels are from giving no torque about some axis, where the measure is zero."
+        )
     )
     if scenario_of(run).control is None:
         caption += " This scenario has no control: no torque is commanded."

@@ -6,10 +6,9 @@ import numpy as np
 import xarray as xr
 from plotly.subplots import make_subplots
 
-from quietbus.plots.signals import AXES, degrees
+from quietbus.plots.signals import AXES, degrees, last_lines
 from quietbus.plots.style import COLOURS
 from quietbus.report.lines import Drawing, Panel, Picture, finished
-from quietbus.results import scenario_of
 
 # variable of a harmonic run: what its line is called
 COMBINED = {
@@ -53,11 +52,11 @@ def _bars(run: xr.Dataset) -> Picture:
     """Amplitudes at the end of the run by rotor and order, a panel for each axis."""
     last = run["bus_rate_jitter_amplitude"].isel(time=-1).transpose("cmg", "order", "axis")
     amplitude = np.rad2deg(last.to_numpy())
-    speeds = [unit.rotor.speed if unit.rotor else 0.0 for unit in scenario_of(run).cluster.placed()]
+    frequency = np.abs(last_lines(run).frequency) / (2.0 * np.pi)
     orders = last["order"].to_numpy()
     figure = make_subplots(rows=3, cols=1, shared_xaxes=True, vertical_spacing=0.06)
     for row, axis in enumerate(AXES, 1):
-        for cmg, speed in enumerate(speeds):
+        for cmg in range(len(frequency)):
             figure.add_bar(
                 x=[f"order {order:g}" for order in orders],
                 y=amplitude[cmg, :, row - 1],
@@ -65,7 +64,7 @@ def _bars(run: xr.Dataset) -> Picture:
                 legendgroup=f"rotor {cmg}",
                 showlegend=row == 1,
                 marker_color=COLOURS[cmg % len(COLOURS)],
-                customdata=orders * abs(speed) / (2.0 * np.pi),
+                customdata=frequency[cmg],
                 hovertemplate=f"rotor {cmg}, about {axis}: %{{y:.4g}} deg/s<br>%{{x}}, "
                 "%{customdata:.5g} Hz<extra></extra>",
                 row=row,

@@ -25,7 +25,7 @@ except ModuleNotFoundError as missing:
     raise ImportError(
         "quietbus report needs the extra: pip install 'quietbus[report]'"
     ) from missing
-from quietbus.results import aliasing, scenario_of, summarize
+from quietbus.results import aliasing, has_gimbals, scenario_of, summarize
 from quietbus.tables import checks_table, summary_table
 
 if TYPE_CHECKING:
@@ -137,7 +137,7 @@ def _facts(run: xr.Dataset) -> dict[str, str]:
         "Method": run.attrs.get("method", "unknown"),
         "Time flown": f"{time[-1]:.6g} s",
         "Output": f"{len(time)} instant{'s' if len(time) > 1 else ''}{rate}",
-        "CMGs": f"{run.sizes['cmg']}",
+        "CMGs" if has_gimbals(run) else "Wheels": f"{run.sizes['cmg']}",
         "Legs": f"{run.sizes['leg']}",
     }
     if "wall_time_s" in run.attrs:

@@ -1,7 +1,13 @@
 """Scenarios: what to simulate, read from YAML, checked and in SI units. No JAX in here."""
 
 from quietbus.scenario.errors import Problem, ScenarioError
-from quietbus.scenario.load import builtin_names, builtin_text, load_scenario, template_text
+from quietbus.scenario.load import (
+    builtin_names,
+    builtin_text,
+    load_scenario,
+    located,
+    template_text,
+)
 from quietbus.scenario.per_cmg import per_cmg_scenarios
 from quietbus.scenario.pointing import LineOfSight
 from quietbus.scenario.schema import Scenario
@@ -16,6 +22,7 @@ __all__ = [
     "builtin_names",
     "builtin_text",
     "load_scenario",
+    "located",
     "per_cmg_scenarios",
     "read_wheel_table",
     "template_text",

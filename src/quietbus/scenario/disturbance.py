@@ -205,7 +205,8 @@ class Disturbance(Part):
         findings = Findings()
         name = data["table"]
         if not isinstance(name, str) or not name:
-            raise expected("the name of a file", name)
+            findings.add("table", expected("the name of a file", name).message())
+            findings.raise_any()
         if data.get("orders") is not None:
             findings.add("table", "expected either table or orders, got both")
         findings.raise_any()

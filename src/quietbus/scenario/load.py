@@ -5,10 +5,12 @@ from __future__ import annotations
 import difflib
 import os
 import pathlib
+from dataclasses import replace
 from importlib.resources import files
 
 from quietbus.scenario.errors import Problem, ScenarioError
 from quietbus.scenario.schema import Scenario
+from quietbus.scenario.text import read_yaml
 
 _BUILTIN = files("quietbus.scenario") / "builtin"
 
@@ -36,10 +38,22 @@ def load_scenario(path_or_name: str | os.PathLike[str]) -> Scenario:
     ScenarioError, also if the file cannot be read.
     """
     source = os.fspath(path_or_name)
+    return Scenario.from_yaml(_text(source), source, str(pathlib.Path(source).parent))
+
+
+def located(error: ScenarioError, path_or_name: str | os.PathLike[str]) -> ScenarioError:
+    """What is wrong with a scenario that was read from here, with file and lines."""
+    source = os.fspath(path_or_name)
+    line_of = read_yaml(_text(source), source)[1]
+    problems = (replace(each, line=line_of(each.path)) for each in error.problems)
+    return ScenarioError(source, problems)
+
+
+def _text(source: str) -> str:
     if source in builtin_names():
-        return Scenario.from_yaml(builtin_text(source), source)
+        return builtin_text(source)
     try:
-        text = pathlib.Path(source).read_text(encoding="utf-8")
+        return pathlib.Path(source).read_text(encoding="utf-8")
     except FileNotFoundError:
         raise ScenarioError(source, [Problem(_not_found(source))]) from None
     except UnicodeDecodeError as error:
@@ -47,7 +61,6 @@ def load_scenario(path_or_name: str | os.PathLike[str]) -> Scenario:
     except (OSError, ValueError) as error:  # ValueError: a null character in the name
         why = getattr(error, "strerror", None) or str(error)
         raise ScenarioError(source, [Problem(f"cannot be read: {why}")]) from None
-    return Scenario.from_yaml(text, source, str(pathlib.Path(source).parent))
 
 
 def _not_found(source: str) -> str:

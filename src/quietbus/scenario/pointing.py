@@ -199,8 +199,13 @@ def _read(value: Any) -> Any:
         if short is None:
             raise expected(f"a mapping with the key metric, or a text like {EXAMPLE!r}", value)
         options = [option.split("=") for option in short[3].split(",")[1:]]
-        given = {key.strip(): _plain(text.strip()) for key, text in options}
-        value = {"metric": short[1], "line_of_sight": short[2], **given, "at_most": short[4]}
+        given = [("metric", short[1]), ("line_of_sight", short[2]), ("at_most", short[4])]
+        given += [(key.strip(), _plain(text.strip())) for key, text in options]
+        keys = [key for key, _ in given]
+        twice = {key for key in keys if keys.count(key) > 1}
+        if twice:
+            raise expected(f"each key once, not {', '.join(sorted(twice))} twice", value)
+        value = dict(given)
     if not isinstance(value, dict):
         raise expected(f"a mapping with the key metric, or a text like {EXAMPLE!r}", value)
     findings = Findings()

@@ -211,7 +211,9 @@ class Quantity:
         return f"{names[0]}?" if names else "another dimension"
 
     def _error(self, value: Any, why: str = "") -> PydanticCustomError:
-        return expected(self.name + (f" in {self.unit}" if self.unit else ""), value, why)
+        # a name may end in a comma, for the unit to follow
+        what = f"{self.name} in {self.unit}" if self.unit else self.name.removesuffix(",")
+        return expected(what, value, why)
 
 
 def expected(what: str, value: Any, why: str = "") -> PydanticCustomError:
