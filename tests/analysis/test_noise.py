@@ -48,7 +48,9 @@ def realised(matrix, length, rate, seed, gains=np.ones_like):
 
 DIFFERENT = ("APE", "MPE", "RPE", "PDE", "smear", "jitter", "rms", "MTF_loss")
 LINE, TURN = np.array([0.9, 0.5j]), 2 * np.pi * 40.3
-LINES = Lines(np.tile(LINE, (4001, 1, 1)), np.array([TURN]), np.zeros(1), np.zeros(1, int), np.ones(1))
+LINES = Lines(
+    np.tile(LINE, (4001, 1, 1)), np.array([TURN]), np.zeros(1), np.zeros(1, int), np.ones(1)
+)
 QUIET = Lines(0.0 * LINES.amplitude, np.array([TURN]), np.zeros(1), np.zeros(1, int), np.ones(1))
 
 
@@ -122,7 +124,9 @@ QUIET_ONE = Lines(
 def test_a_sine_with_noise_has_the_quantile_of_their_sum(p):
     """Of A cos(phase) + n: the normal distribution, averaged over the phase."""
     A, sigma = 1.3, 0.7
-    lines = Lines(np.full((4001, 1, 1), A + 0j), np.array([TURN]), np.zeros(1), np.zeros(1, int), np.ones(1))
+    lines = Lines(
+        np.full((4001, 1, 1), A + 0j), np.array([TURN]), np.zeros(1), np.zeros(1, int), np.ones(1)
+    )
     motion = ImageMotion(still(1), lines, flat([[sigma**2 / (HIGH - LOW)]]))
     phase = np.pi * (np.arange(4000) + 0.5) / 4000
     sine = A * np.cos(phase)

@@ -70,9 +70,7 @@ class DeviationNoise:
             return np.max([np.abs(gain(self.metric, f, x)) ** 2 for x in instants], axis=0)
 
         value, moving = (
-            self.noise.at(
-                self.times, self.noise.weighted(self.metric, share, moment).sum(axis=1)
-            )
+            self.noise.at(self.times, self.noise.weighted(self.metric, share, moment).sum(axis=1))
             for moment in (0, 2)
         )
         return largest(probability, value, moving, self.duration)
@@ -140,12 +138,14 @@ class JitterNoise:
         scale = np.sqrt(2.0 * orders + 1.0)
         j = scale * np.stack([bessel(n, np.pi * at * self.window) for n in orders], axis=1)
         product = np.einsum("q,qab,qm,qn->ambn", weights, density, j, j, optimize=True)
-        turn = (1j**orders[:, None] * (-1j) ** orders).real  # no odd with an even one
+        turn = (1j ** orders[:, None] * (-1j) ** orders).real  # no odd with an even one
         count = mean.shape[-1] * len(orders)
         self.covariance = (product * turn[:, None, :]).reshape(count, count)
         self.variance = 2.0 * np.sum(self.covariance**2)
         u = np.pi * lines_hz * self.window
-        self.lines = np.stack([1j**n * k * bessel(n, u) for n, k in zip(orders, scale, strict=True)])
+        self.lines = np.stack(
+            [1j**n * k * bessel(n, u) for n, k in zip(orders, scale, strict=True)]
+        )
 
     def _many_periods(self, f: np.ndarray, mean: np.ndarray, lines_hz: np.ndarray) -> None:
         """The mean square varies by int S^2 df / T; with a line by its power times S / T."""

@@ -1,8 +1,8 @@
 """Pointing metrics of image motion, with statistics at a stated confidence level.
 
 What varies is the instant (or window) within the stretch that is judged, and the member of the
-ensemble: the rotors' phases, which nobody controls, and the noise. ECSS-E-ST-60-10C has three interpretations of
-"within the limit with probability p":
+ensemble: the rotors' phases, which nobody controls, and the noise. ECSS-E-ST-60-10C has three
+interpretations of "within the limit with probability p":
 
 - ensemble: for a share p of the members, at all times;
 - temporal: for the worst member, a share p of the time;
@@ -228,9 +228,7 @@ class _Judge:
             return np.concatenate([self.values(*part) for part in _parts(turns, which)])
         return self._squared(self.phasors(turns, which), which, luck)
 
-    def _squared(
-        self, z: np.ndarray, which: np.ndarray | slice, luck: Luck | None
-    ) -> np.ndarray:
+    def _squared(self, z: np.ndarray, which: np.ndarray | slice, luck: Luck | None) -> np.ndarray:
         if self.metric.name == "rms":
             assert self.band is not None
             total = np.full(len(z), np.trace(self.band) + np.sum(self.noise_powers))
