@@ -23,6 +23,7 @@ from quietbus.solve.direct import SLOW, Scheme, Solution
 from quietbus.solve.harmonic import TOLERANCES, HarmonicSolution, Jitter
 
 AXES = ("x", "y", "z")
+PAIRS = ("yz", "zx", "xy")
 _DIMENSIONS = {
     "axis": ("axis", list(AXES), "component"),
     "quaternion": ("quaternion", ["w", "x", "y", "z"], "component, scalar first"),
@@ -163,6 +164,8 @@ def to_dataset(
                 noise.frequency,
                 {"units": "Hz", "long_name": "frequency"},
             )
+            if noise.cospectrum.size:
+                coordinates["pair"] = ("pair", list(PAIRS), {"long_name": "two components"})
         coordinates["order"] = (
             "order",
             list(scenario.cluster.orders),
@@ -242,6 +245,16 @@ def _jitter_variables(frequency: np.ndarray, angle: np.ndarray, jitter: Jitter) 
         for kind, said in COMBINED.items():
             whole = getattr(combined, kind).reshape(len(values), *values.shape[3:])
             data[f"{name}_jitter_{kind}"] = _variable(whole, inner, unit, f"{of}: {said}")
+    if jitter.broadband is not None and jitter.broadband.cospectrum.size:
+        data["line_of_sight_cospectrum"] = (
+            ("look", "frequency", "cmg", "line", "pair"),
+            jitter.broadband.cospectrum,
+            {
+                "units": _per_hertz("rad"),
+                "long_name": "real part of the one-sided cross-spectrum of two components of a "
+                "line of sight's jitter by rotor noise",
+            },
+        )
     return data
 
 

@@ -11,13 +11,21 @@ from scipy.spatial.transform import Rotation
 
 from quietbus.analysis.channels import json_ready
 from quietbus.analysis.motion import ImageMotion, Lines, SampledSignal
+from quietbus.analysis.noise import Noise
 from quietbus.analysis.pointing import Statistic, check_stretch, contributions, evaluate
-from quietbus.analysis.windows import Metric
-from quietbus.results import aliasing, scenario_of
+from quietbus.analysis.windows import MOST_PERIODS, Metric
+from quietbus.results import AXES, aliasing, scenario_of
 from quietbus.scenario import Problem, Scenario, ScenarioError
+from quietbus.scenario.control import NoSteering
 
 ARCSEC = np.rad2deg(1.0) * 3600.0
 JUDGED = 0.1  # share of a run, its last part, that is judged unless a requirement says otherwise
+RIPPLE = (
+    "the lines that cluster.gimbal_motor makes have the frequency of the gimbals' rates, which "
+    "changes: a harmonic run cannot judge them. Use method 'direct', or take gimbal_motor out to "
+    "judge the rest"
+)
+STEADY = 0.02  # relative change of a rotor's speed that counts as none
 CURVE = 17  # exposure times
 CURVE_EFFORT = 0.1
 NOTHING = 1e-9  # of all: lines that are left out of the contributions
@@ -71,8 +79,8 @@ class Verdict:
 class Verification:
     """The pointing requirements of a run's scenario.
 
-    Of a harmonic run each value is of slow motion and lines together, over all rotor phases if the
-    requirement does not say otherwise. A direct run is the only member of its ensemble.
+    Of a harmonic run each value is of slow motion, lines and noise together, over all rotor phases
+    if the requirement does not say otherwise. A direct run is the only member of its ensemble.
 
     Raises:
         ScenarioError: requirements that the run cannot judge (``check_requirements``).
@@ -83,6 +91,19 @@ class Verification:
     def __post_init__(self) -> None:
         time = self.run["time"].to_numpy()
         check_requirements(self.scenario, self.run.attrs["method"], float(time[-1]))
+        if self.run.attrs["method"] == "harmonic":
+            try:
+                _rotors(self.run, self.scenario, self._judged_time)
+            except ValueError as error:
+                problem = Problem(str(error), ("requirements",))
+                raise ScenarioError(self.scenario.name, [problem]) from None
+
+    @property
+    def _judged_time(self) -> tuple[float, float]:
+        """From the first instant to the last that any requirement looks at [s]."""
+        last = float(self.run["time"][-1])
+        ends = [_stretch(each, last) for each in self.scenario.requirements]
+        return min(start for start, _ in ends), max(end for _, end in ends)
 
     @cached_property
     def scenario(self) -> Scenario:
@@ -91,7 +112,8 @@ class Verification:
 
     @cached_property
     def _motions(self) -> dict[str, ImageMotion]:
-        return {name: image_motion(self.run, name) for name in self.scenario.lines_of_sight}
+        lines, judged = self.scenario.lines_of_sight, self._judged_time
+        return {name: image_motion(self.run, name, judged) for name in lines}
 
     def motion(self, line_of_sight: str) -> ImageMotion:
         """Image motion of a line of sight [rad]."""
@@ -211,8 +233,18 @@ def check_requirements(scenario: Scenario, method: str, last: float) -> None:
     if too_coarse:
         text = f"{too_coarse}. Use method 'harmonic', or raise simulation.output_rate"
         problems.append(Problem(text, ("requirements",)))
+    if method == "harmonic" and scenario.cluster.gimbal_motor and _gimbals_move(scenario):
+        problems.append(Problem(RIPPLE, ("requirements",)))
+    highest = _highest_noise(scenario) if method == "harmonic" else 0.0
     for i, requirement in enumerate(scenario.requirements):
         metric = _metric(requirement)
+        if metric.span * highest > MOST_PERIODS:
+            text = (
+                f"expected a window (and tau) of at most {MOST_PERIODS / highest:.4g} s, in which "
+                f"broadband noise up to {highest:g} Hz can be integrated over; got "
+                f"{metric.span:g} s. Use method 'direct'"
+            )
+            problems.append(Problem(text, ("requirements", i, "window")))
         try:
             check_stretch(0.0, last, metric, _stretch(requirement, last))
         except ValueError as error:
@@ -224,6 +256,22 @@ def check_requirements(scenario: Scenario, method: str, last: float) -> None:
             problems.append(Problem(text, ("requirements", i, "above")))
     if problems:
         raise ScenarioError(scenario.name, problems)
+
+
+def _gimbals_move(scenario: Scenario) -> bool:
+    control = scenario.control
+    return control is not None and not isinstance(control.steering, NoSteering)
+
+
+def _highest_noise(scenario: Scenario) -> float:
+    """Highest frequency [Hz] of the rotors' broadband disturbance; 0 without."""
+    ends = [
+        spectrum.frequency[-1]
+        for unit in scenario.cluster.placed()
+        if unit.rotor and unit.rotor.disturbance
+        for spectrum in unit.rotor.disturbance.broadband.given().values()
+    ]
+    return max(ends, default=0.0)
 
 
 def _name(metric: Metric) -> str:
@@ -247,6 +295,7 @@ def _time(seconds: float) -> str:
 def _meaning(metric: Metric, statistic: Statistic, motion: ImageMotion) -> str:
     """What the value is, in words."""
     given = motion.lines is None or statistic.phases == "given"
+    noisy = motion.noise is not None
     phases = "rotor phases as given" if given else "any rotor phases"
     if statistic.confidence is None:
         mean = "mean" if metric.name == "MTF_loss" else "RMS"
@@ -256,23 +305,32 @@ def _meaning(metric: Metric, statistic: Statistic, motion: ImageMotion) -> str:
         case "temporal", False:
             return f"{level} of the time for the worst rotor phases (temporal)"
         case "ensemble", False:
-            return f"always, for {level} of all rotor phases (ensemble)"
+            noise = " and noise" if noisy else ""
+            return f"always, for {level} of all rotor phases{noise} (ensemble)"
         case "mixed", False:
             return f"{level} of all times and rotor phases (mixed)"
+        case "ensemble", True if noisy:
+            return f"always, for {level} of all noise, {phases} (ensemble)"
         case "ensemble", True:
             return f"always, {phases} (ensemble of one member)"
         case _:
             return f"{level} of the time, {phases} ({statistic.interpretation})"
 
 
-def image_motion(run: xr.Dataset, name: str) -> ImageMotion:
+def image_motion(
+    run: xr.Dataset, name: str, stretch: tuple[float, float] | None = None
+) -> ImageMotion:
     """Image motion of a line of sight of the run's scenario [rad].
 
     The signal is the error against the commanded attitude, the whole of it of a direct run and its
-    slow part of a harmonic one, whose lines come beside it.
+    slow part of a harmonic one, whose lines and noise come beside it.
+
+    Args:
+        stretch: [s] over which rotors' speeds have to be steady; the whole run by default.
 
     Raises:
-        ValueError: the scenario has no such line of sight.
+        ValueError: the scenario has no such line of sight, or the run has ripple of gimbal motors
+            or rotors whose speed changes: lines of changing frequency.
     """
     scenario = scenario_of(run)
     if name not in scenario.lines_of_sight:
@@ -292,17 +350,65 @@ def image_motion(run: xr.Dataset, name: str) -> ImageMotion:
     )
     image = (amplitude * np.exp(1j * shift)) @ line.image().T
     orders = run["order"].to_numpy()
-    units = scenario.cluster.placed()
-    speed = np.array([unit.rotor.speed if unit.rotor else 0.0 for unit in units])
-    phase = np.array(scenario.cluster.rotor_phases or np.zeros(len(units)))
+    if np.any(run.get("line_of_sight_ripple_amplitude", 0.0)):
+        raise ValueError(RIPPLE)
+    speed, phase = _rotors(run, scenario, stretch)
     lines = Lines(
         amplitude=image.reshape(len(time), -1, image.shape[-1]),
         frequency=np.outer(speed, orders).ravel(),
         phase=np.outer(phase, orders).ravel(),
-        rotor=np.repeat(np.arange(len(units)), len(orders)),
-        order=np.tile(orders, len(units)),
+        rotor=np.repeat(np.arange(len(speed)), len(orders)),
+        order=np.tile(orders, len(speed)),
     )
-    return ImageMotion(signal, lines)
+    return ImageMotion(signal, lines, _noise(run, name, line.image()))
+
+
+def _rotors(
+    run: xr.Dataset, scenario: Scenario, stretch: tuple[float, float] | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Speeds [rad/s] of the rotors and their angles at t = 0 [rad], as of steady ones.
+
+    Raises:
+        ValueError: a speed that changes within the stretch.
+    """
+    units = scenario.cluster.placed()
+    if "rotor_speed" not in run:
+        speed = np.array([unit.rotor.speed if unit.rotor else 0.0 for unit in units])
+        return speed, np.array(scenario.cluster.rotor_phases or np.zeros(len(units)))
+    time = run["time"].to_numpy()
+    start, end = stretch or (time[0], time[-1])
+    here = (time >= start - 1e-9) & (time <= end + 1e-9)
+    speeds, angles = (run[f"rotor_{part}"].to_numpy()[here] for part in ("speed", "angle"))
+    change = float(np.max(np.ptp(speeds, axis=0)) / max(np.max(np.abs(speeds)), 1e-300))
+    if change > STEADY:
+        raise ValueError(
+            f"the rotors' speeds change by up to {100 * change:.3g} % from {start:g} s to {end:g} "
+            f"s, and the frequencies of their lines with them: a harmonic run judges stretches in "
+            f"which they change by {100 * STEADY:g} % at most. Use method 'direct', or another "
+            "stretch (start, end)"
+        )
+    speed = speeds.mean(axis=0)
+    return speed, np.mean(angles - np.outer(time[here], speed), axis=0)
+
+
+def _noise(run: xr.Dataset, name: str, image: np.ndarray) -> Noise | None:
+    """Of a line of sight's image, by rotor; None where no rotor has a broadband disturbance."""
+    if "line_of_sight_psd" not in run:
+        return None
+    psd, cross = (
+        run[f"line_of_sight_{kind}"]
+        .sel(line=name)
+        .transpose("look", "frequency", "cmg", ...)
+        .to_numpy()
+        for kind in ("psd", "cospectrum")
+    )
+    density = psd[..., None] * np.eye(3)
+    for k, pair in enumerate(run["pair"].to_numpy()):
+        a, b = (AXES.index(axis) for axis in pair)
+        density[..., a, b] = density[..., b, a] = cross[..., k]
+    density = np.einsum("ia,lfjab,kb->lfjik", image, density, image)
+    names = tuple(f"rotor {j}, broadband" for j in run["cmg"].to_numpy())
+    return Noise(run["look"].to_numpy(), run["frequency"].to_numpy(), density, names)
 
 
 def _errors(run: xr.Dataset, scenario: Scenario) -> np.ndarray:

@@ -1,6 +1,7 @@
 """The equations of small vibration: their parts against the nonlinear equations and analysis."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import jax
 import jax.numpy as jnp
@@ -15,8 +16,10 @@ from quietbus.dynamics.kinematics import PlateMotion
 from quietbus.dynamics.linearize import OperatingPoint, linearize
 from quietbus.dynamics.vibration import (
     Coefficients,
+    View,
     body_coefficients,
     leg_coefficients,
+    linear_outputs,
     slow_motion,
 )
 from quietbus.model.cmg import ClusterMoments
@@ -143,3 +146,18 @@ def test_plate_motion_is_seen_along_the_bus(moving):
     inertial = plate_motion(slow.state)
     assert np.asarray(slow.plates.R_NB) == pytest.approx(np.eye(3))
     assert np.asarray(inertial.R_NB @ slow.plates.p_BP) == pytest.approx(np.asarray(inertial.p_BP))
+
+
+def test_each_motion_moves_the_image_by_its_own_column(moving):
+    """Satellite as one body: the bus's six columns alone. Plate alone: the plate's six alone."""
+    satellite, slow, _ = moving
+    small = SimpleNamespace(slow=slow, turning=jnp.zeros((3, 3)))
+    view = View(jnp.zeros((0, 3)), jnp.eye(12).reshape(4, 3, 12))
+    see = lambda xi: linear_outputs(satellite, small, 1j, jnp.array(xi), view)  # noqa: E731
+    r, theta = np.random.default_rng(3).normal(size=(2, 3)) + 0j
+    as_one = np.concatenate([r + np.cross(theta, slow.plates.p_BP), theta, r, theta])
+    expected = np.concatenate([theta, r, np.zeros(6)])
+    assert np.max(np.abs(see(as_one)["line_of_sight"].ravel() - expected)) < 1e-12
+    plate = np.concatenate([r, theta, np.zeros(6)])
+    expected = np.concatenate([np.zeros(6), theta, r])
+    assert np.max(np.abs(see(plate)["line_of_sight"].ravel() - expected)) < 1e-12

@@ -1,4 +1,4 @@
-"""Image motion: a sampled signal, and lines of known amplitude on top of it."""
+"""Image motion: a sampled signal, and on top of it lines of known amplitude and noise."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
+from quietbus.analysis.noise import Noise
 from quietbus.analysis.spectrum import detrended
 
 SAME_FREQUENCY = 1e-9  # relative: lines closer than this are one
@@ -156,21 +157,22 @@ class Lines:
 
 @dataclass(frozen=True)
 class ImageMotion:
-    """Motion of an image: a signal, and lines on top of it.
+    """Motion of an image: a signal, and on top of it lines and noise.
 
-    Of a harmonic run the signal is the slow motion; a direct run has no lines apart.
+    Of a harmonic run the signal is the slow motion; a direct run has all of it in the signal.
     """
 
     signal: SampledSignal
     lines: Lines | None = None
+    noise: Noise | None = None
 
     def component(self, i: int) -> "ImageMotion":
         """Component i of the image motion alone."""
         signal = replace(self.signal, values=self.signal.values[:, i : i + 1])
-        if self.lines is None:
-            return ImageMotion(signal)
-        amplitude = self.lines.amplitude[..., i : i + 1]
-        return ImageMotion(signal, replace(self.lines, amplitude=amplitude))
+        lines = self.lines
+        if lines is not None:
+            lines = replace(lines, amplitude=lines.amplitude[..., i : i + 1])
+        return ImageMotion(signal, lines, self.noise and self.noise.component(i))
 
     def phasors(self, t: np.ndarray) -> np.ndarray:
         """(time, line, c) of the lines at times [s], phases as given."""

@@ -1,8 +1,8 @@
 """Pointing metrics of image motion, with statistics at a stated confidence level.
 
 What varies is the instant (or window) within the stretch that is judged, and the member of the
-ensemble: the rotors' phases, which nobody controls. ECSS-E-ST-60-10C has three interpretations of
-"within the limit with probability p":
+ensemble: the rotors' phases, which nobody controls, and the noise. ECSS-E-ST-60-10C has three
+interpretations of "within the limit with probability p":
 
 - ensemble: for a share p of the members, at all times;
 - temporal: for the worst member, a share p of the time;
@@ -11,7 +11,9 @@ ensemble: the rotors' phases, which nobody controls. ECSS-E-ST-60-10C has three 
 The functions return the smallest limit that is met so (docs/theory.md, section 16).
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -19,6 +21,7 @@ from scipy.optimize import brentq, minimize
 from scipy.stats import norm
 
 from quietbus.analysis.image_quality import mtf_loss
+from quietbus.analysis.judged_noise import DeviationNoise, JitterNoise, Luck
 from quietbus.analysis.motion import ImageMotion, SampledSignal, WindowParts
 from quietbus.analysis.windows import DRIFTS, LINEAR, Metric, gain, left_over, weight
 
@@ -27,6 +30,7 @@ Phases = Literal["random", "given"]
 INTERPRETATIONS = ("ensemble", "temporal", "mixed")
 SEED = 20081115  # of everything that is drawn, so that a result comes out the same each time
 WINDOWS = 16384  # at most, looked at in a stretch
+AT_ONCE = 2**14  # of these, looked at in one go
 DRAWS = 2**17  # of member and window together (mixed)
 MEMBERS = 2000  # at least (ensemble)
 MOST_MEMBERS = 20_000  # (ensemble); rarer ones are bounded by the worst member
@@ -82,24 +86,21 @@ def evaluate(
     if wanted.confidence is None:
         return judge.average(wanted.phases)
     alone = motion.lines is None or wanted.phases == "given"
-    if alone:
-        if wanted.interpretation == "ensemble":
-            return float(np.max(judge.over_time(np.zeros((1, judge.rotors)))))
-        values = judge.values(np.zeros((1, judge.rotors)))
-        return float(np.quantile(values, wanted.confidence))
-    match wanted.interpretation:
-        case "temporal":
+    match wanted.interpretation, alone:
+        case "ensemble", _:
+            return judge.ensemble(wanted.confidence, alone)
+        case _, True:
+            return judge.quantile(wanted.confidence, np.zeros((1, judge.rotors)))
+        case "temporal", False:
             return judge.worst_member(wanted.confidence)
-        case "mixed":
-            return float(np.quantile(judge.draws(), wanted.confidence))
         case _:
-            return judge.ensemble(wanted.confidence)
+            return judge.quantile(wanted.confidence, *judge.draws())
 
 
 def contributions(
     motion: ImageMotion, metric: Metric, stretch: tuple[float, float]
 ) -> dict[str, float]:
-    """Root mean square that slow motion and each line alone have in a metric, by name [rad].
+    """Root mean square that slow motion, each line and noise alone have in a metric [rad].
 
     Of ``MTF_loss`` it is that of smear and jitter, the motion within the window. Independent
     phases: the squares add up to that of all.
@@ -110,6 +111,8 @@ def contributions(
         share = weight(metric, np.abs(motion.lines.frequency) / (2.0 * np.pi))
         power = share * np.mean(np.sum(0.5 * np.abs(judge.base) ** 2, axis=2), axis=0)
         parts |= dict(zip(motion.lines.names, power.tolist(), strict=True))
+    if motion.noise is not None:
+        parts |= dict(zip(motion.noise.names, judge.noise_powers.tolist(), strict=True))
     return {name: float(np.sqrt(value)) for name, value in parts.items()}
 
 
@@ -124,6 +127,7 @@ class _Judge:
         effort: float = 1.0,
     ):
         self.metric, self.lines, self.effort = metric, motion.lines, effort
+        self.noise = motion.noise
         signal, (start, end) = motion.signal, stretch
         check_stretch(float(signal.time[0]), float(signal.time[-1]), metric, stretch)
         self.rng = np.random.default_rng(SEED)
@@ -133,7 +137,7 @@ class _Judge:
         self.centers = low + max(0.0, end - start - metric.span) * part
         self.at = self.rng.random(count) - 0.5  # of an RPE's instant in its window
         self.base = np.zeros((count, 0, signal.values.shape[1]), complex)
-        self.rotors = 0
+        self.rotors, self.f = 0, np.zeros(0)
         if self.lines is not None and len(self.lines.frequency):
             self.base = motion.phasors(self.centers)
             self.rotors = int(np.max(self.lines.rotor)) + 1
@@ -141,6 +145,14 @@ class _Judge:
             u = np.pi * self.f * metric.window
             self.same, self.other = (left_over(u[:, None], side, 2) for side in (u, -u))
         self.slow = _slow(signal, metric, self.centers, self.at)
+        self.deviating: DeviationNoise | None = None
+        self.jittering: JitterNoise | None = None
+        if self.noise is not None and metric.name in LINEAR:
+            self.deviating = DeviationNoise(self.noise, metric, self.centers, self.at, stretch)
+        elif self.noise is not None and metric.name != "rms":
+            self.jittering = JitterNoise(
+                self.noise, metric, self.centers, self.f, stretch, self.rng
+            )
         self.band = (
             signal.mean_square_above(metric.above, start, end) if metric.name == "rms" else None
         )
@@ -162,6 +174,15 @@ class _Judge:
                 assert isinstance(self.slow, np.ndarray)
                 return float(np.mean(np.sum(self.slow**2, axis=1)))
 
+    @cached_property
+    def noise_powers(self) -> np.ndarray:
+        """Mean square (part,) of each of the noise's contributors, in this metric."""
+        if self.noise is None:
+            return np.zeros(0)
+        share = lambda f: weight(self.metric, f)  # noqa: E731
+        found = np.trace(self.noise.weighted(self.metric, share), axis1=2, axis2=3)
+        return np.asarray(np.mean(self.noise.at(self.centers, found), axis=0))
+
     def phasors(self, turns: np.ndarray, which: np.ndarray | slice) -> np.ndarray:
         """Phasors (n, group, c) in windows ``which`` for members' turns (n or 1, rotor)."""
         if self.lines is None or not self.rotors:
@@ -169,23 +190,48 @@ class _Judge:
         shift = np.exp(1j * self.lines.order * turns[:, self.lines.rotor])
         return self.lines.together(self.base[which] * shift[..., None])
 
-    def values(self, turns: np.ndarray, which: np.ndarray | slice = slice(None)) -> np.ndarray:
-        """The metric (n,) in windows ``which`` for members (n or 1, rotor)."""
-        z = self.phasors(turns, which)
-        if self.metric.name in LINEAR:
-            assert isinstance(self.slow, np.ndarray)
-            moved = self.slow[which]
-            if self.rotors:
-                g = gain(self.metric, self.f, self.at[which][:, None])
-                g = np.broadcast_to(g, z.shape[:2])[..., None]
-                moved = moved + np.sum(g * z, axis=1).real
-            return np.linalg.norm(moved, axis=1)
-        return self._squared(z, which)
+    def quantile(
+        self, confidence: float, turns: np.ndarray, which: np.ndarray | slice = slice(None)
+    ) -> float:
+        """Of the metric in windows ``which`` for members (n or 1, rotor), all together."""
+        if self.deviating is not None:
+            return self.deviating.quantile(confidence, self.deviations(turns, which), which)
+        return float(np.quantile(self.values(turns, which), confidence))
 
-    def _squared(self, z: np.ndarray, which: np.ndarray | slice) -> np.ndarray:
+    def deviations(self, turns: np.ndarray, which: np.ndarray | slice) -> np.ndarray:
+        """A linear metric (n, c) as a vector, without its noise."""
+        if isinstance(which, np.ndarray) and len(which) > AT_ONCE:
+            return np.concatenate([self.deviations(*part) for part in _parts(turns, which)])
+        z = self.phasors(turns, which)
+        assert isinstance(self.slow, np.ndarray)
+        moved = self.slow[which]
+        if self.rotors:
+            g = gain(self.metric, self.f, self.at[which][:, None])
+            g = np.broadcast_to(g, z.shape[:2])[..., None]
+            moved = moved + np.sum(g * z, axis=1).real
+        return moved
+
+    def values(
+        self,
+        turns: np.ndarray,
+        which: np.ndarray | slice = slice(None),
+        luck: Luck | None = None,
+    ) -> np.ndarray:
+        """The metric (n,) in windows ``which`` for members (n or 1, rotor).
+
+        A linear one without its noise, which ``quantile`` has. In the others noise takes its
+        chances in the windows, or those of ``luck``.
+        """
+        if self.metric.name in LINEAR:
+            return np.linalg.norm(self.deviations(turns, which), axis=1)
+        if isinstance(which, np.ndarray) and len(which) > AT_ONCE:
+            return np.concatenate([self.values(*part) for part in _parts(turns, which)])
+        return self._squared(self.phasors(turns, which), which, luck)
+
+    def _squared(self, z: np.ndarray, which: np.ndarray | slice, luck: Luck | None) -> np.ndarray:
         if self.metric.name == "rms":
             assert self.band is not None
-            total = np.full(len(z), np.trace(self.band))
+            total = np.full(len(z), np.trace(self.band) + np.sum(self.noise_powers))
             if self.rotors:
                 share = weight(self.metric, self.f)
                 total = total + 0.5 * np.einsum("g,ngc->n", share, np.abs(z) ** 2)
@@ -196,6 +242,13 @@ class _Judge:
             covariance = covariance + self._jitter_of_lines(z)
             drift = Metric("smear", self.metric.window)
             smear = smear + np.sum(gain(drift, self.f)[:, None] * z, axis=1).real
+        if self.jittering is not None:
+            noise = self.jittering
+            luck = luck or noise.luck.of(which)
+            known = np.trace(covariance, axis1=1, axis2=2)
+            factor = noise.factor(known, z, which, luck)
+            covariance = factor[:, None, None] * (covariance + noise.jitter[which])
+            smear = smear + np.einsum("nab,nb->na", noise.smear[which], luck.direction)
         if self.metric.name == "jitter":
             return np.sqrt(np.trace(covariance, axis1=1, axis2=2))
         directions = half_circle(z.shape[2])
@@ -211,8 +264,8 @@ class _Judge:
         if self.metric.name == "MTF_loss":
             if self.lines is None or phases == "given":
                 return float(np.mean(self.values(np.zeros((1, self.rotors)))))
-            return float(np.mean(self.draws()))
-        total = self.slow_mean_square
+            return float(np.mean(self.values(*self.draws())))
+        total = self.slow_mean_square + float(np.sum(self.noise_powers))
         if self.rotors and self.lines is not None:
             if phases == "random":
                 f, z = np.abs(self.lines.frequency) / (2.0 * np.pi), self.base
@@ -222,14 +275,11 @@ class _Judge:
             total += float(weight(self.metric, f) @ power)
         return float(np.sqrt(total))
 
-    def draws(self) -> np.ndarray:
-        """Values of members and windows drawn together, each independent of the others."""
-        values = []
-        for _ in range(8):
-            n = int(self.effort * DRAWS) // 8
-            which = self.rng.integers(len(self.centers), size=n)
-            values.append(self.values(self.rng.uniform(0, 2 * np.pi, (n, self.rotors)), which))
-        return np.concatenate(values)
+    def draws(self) -> tuple[np.ndarray, np.ndarray]:
+        """Members (n, rotor) and windows (n,) drawn together, each independent of the others."""
+        n = int(self.effort * DRAWS)
+        which = self.rng.integers(len(self.centers), size=n)
+        return self.rng.uniform(0, 2 * np.pi, (n, self.rotors)), which
 
     def worst_member(self, confidence: float) -> float:
         """Largest quantile over time that any member has, as far as the search finds.
@@ -238,9 +288,7 @@ class _Judge:
         with the runners-up in all windows.
         """
         some = np.linspace(0, len(self.centers) - 1, min(TRIED, len(self.centers))).astype(int)
-        quantile = lambda turns, which: float(  # noqa: E731
-            np.quantile(self.values(turns[None], which), confidence)
-        )
+        quantile = lambda turns, which: self.quantile(confidence, turns[None], which)  # noqa: E731
         tried = self.far_reaching()
         first = np.array([quantile(turns, some) for turns in tried])
         best = tried[np.argsort(-first)[:3]]
@@ -279,17 +327,40 @@ class _Judge:
                 turns[:, j] = steps[np.argmax(reach, axis=1)]
         return turns
 
-    def ensemble(self, confidence: float) -> float:
-        """Quantile over members of the largest value at any time."""
-        count = int(self.effort * max(MEMBERS, np.ceil(TAIL / (1.0 - confidence))))
-        if count > self.effort * MOST_MEMBERS:
-            return float(np.max(self.over_time(self.far_reaching())))
-        members = self.rng.uniform(0, 2 * np.pi, (count, self.rotors))
-        parts = [self.over_time(members[i : i + 500]) for i in range(0, count, 500)]
-        return float(np.quantile(np.concatenate(parts), confidence, method="higher"))
+    def ensemble(self, confidence: float, alone: bool) -> float:
+        """Quantile over members of the largest value at any time.
 
-    def over_time(self, members: np.ndarray) -> np.ndarray:
-        """Largest value (n,) at any time for members (n, rotor).
+        Noise makes members, too. In a linear metric its largest value and that of the rest are
+        taken to meet.
+
+        Args:
+            alone: the rotors' phases are as given.
+        """
+        noisy = self.deviating is not None or self.jittering is not None
+        count = int(self.effort * max(MEMBERS, np.ceil(TAIL / (1.0 - confidence))))
+        if alone and not noisy:
+            members, chance = np.zeros((1, self.rotors)), np.ones(1)
+        elif count > self.effort * MOST_MEMBERS:
+            members = np.zeros((1, self.rotors)) if alone else self.far_reaching()
+            chance = np.full(len(members), confidence)
+            confidence = 1.0
+        else:
+            members = self.rng.uniform(0, 2 * np.pi, (count, self.rotors))
+            members = members * (not alone)
+            chance = (np.arange(count) + 0.5) / count
+            if noisy:
+                chance = self.rng.permutation(chance)
+        parts = [
+            self.over_time(members[i : i + 500], chance[i : i + 500])
+            for i in range(0, len(members), 500)
+        ]
+        largest = np.concatenate(parts)
+        if self.deviating is not None:
+            largest = largest + self.deviating.largest(chance)
+        return float(np.quantile(largest, confidence, method="higher"))
+
+    def over_time(self, members: np.ndarray, chance: np.ndarray) -> np.ndarray:
+        """Largest value (n,) at any time for members (n, rotor), a linear metric's without noise.
 
         Lines of different frequency beat, so that sooner or later all of them peak together: an
         upper bound where they are few turns of a beat or multiples of one speed.
@@ -297,7 +368,9 @@ class _Judge:
         looks = np.unique(np.linspace(0, len(self.centers) - 1, LOOKS).astype(int))
         if self.metric.name not in LINEAR:
             looks = np.unique(np.linspace(0, len(self.centers) - 1, 4 * LOOKS).astype(int))
-            each = [self.values(members, np.full(len(members), k)) for k in looks]
+            noise = self.jittering
+            luck = noise.worst(chance, self.rng) if noise is not None else None
+            each = [self.values(members, np.full(len(members), k), luck) for k in looks]
             return np.asarray(np.max(each, axis=0))
         assert isinstance(self.slow, np.ndarray)
         if not self.rotors:
@@ -315,6 +388,14 @@ class _Judge:
             largest = np.maximum(largest, total)
         # the true direction lies half a step at most from those looked at
         return largest / (np.cos(np.pi / DIRECTIONS) if len(around) > 2 else 1.0)
+
+
+def _parts(turns: np.ndarray, which: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Members and windows, some at a time."""
+    count = int(np.ceil(len(which) / AT_ONCE))
+    if len(turns) == 1:
+        return ((turns, part) for part in np.array_split(which, count))
+    return zip(np.array_split(turns, count), np.array_split(which, count), strict=True)
 
 
 def check_stretch(first: float, last: float, metric: Metric, stretch: tuple[float, float]) -> None:

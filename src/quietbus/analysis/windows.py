@@ -6,10 +6,10 @@ spherical Bessel functions j_n, and ``sum (2 n + 1) j_n^2 = 1``. Order 0 is the 
 smear, the rest is jitter (docs/theory.md, section 16).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 from scipy.special import spherical_jn
 
 SMALL = 1.0  # [rad] u below which differences of nearly equal numbers become sums
@@ -142,27 +142,68 @@ def mean_square_of_density(
 
     Raises:
         ValueError: a table that is not increasing, finite and non-negative, or too long a window
-            for its range of frequencies (more than 4 million periods).
+            for its range of frequencies (more than MOST_PERIODS).
     """
     f, S = checked_density(frequency_hz, density)
-    finest = 1.0 / (32.0 * max(metric.span, 1.0 / f[-1]))
+    share = lambda x: weight(metric, x)  # noqa: E731
+    return np.tensordot(table_weights(f, share, metric.span, metric.above), S, axes=1)
+
+
+MOST_PERIODS = 500_000
+PIECES = 8  # in a period of the longest time, for three points of Gauss each
+
+
+def table_weights(
+    frequency_hz: np.ndarray,
+    share: Callable[[np.ndarray], np.ndarray],
+    span: float,
+    corner: float = 0.0,
+) -> np.ndarray:
+    """Weights (f,) of a table, linear in between, in its integral times a share.
+
+    Args:
+        share: of frequencies [Hz].
+        frequency_hz, span, corner: as of ``table_nodes``.
+    """
+    f = np.asarray(frequency_hz, dtype=float)
+    at, weights = table_nodes(f, span, corner)
+    value = weights * share(at)
+    left = np.clip(np.searchsorted(f, at, side="right") - 1, 0, len(f) - 2)
+    part = (at - f[left]) / (f[left + 1] - f[left])
+    below = np.bincount(left, (1.0 - part) * value, len(f))
+    return below + np.bincount(left + 1, part * value, len(f))
+
+
+def table_nodes(
+    frequency_hz: np.ndarray, span: float, corner: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies [Hz] and weights of a quadrature over a table, by Gauss's in small pieces.
+
+    Args:
+        frequency_hz: (f,) increasing.
+        span: [s] what is integrated oscillates with periods of 1/span or longer.
+        corner: frequency [Hz] at which it may jump.
+
+    Raises:
+        ValueError: a span of too many periods.
+    """
+    f = np.asarray(frequency_hz, dtype=float)
+    finest = 1.0 / (PIECES * max(span, 1.0 / f[-1]))
     pieces = np.maximum(1, np.ceil(np.diff(f) / finest)).astype(int)
-    if np.sum(pieces) > 4_000_000:
+    if span * f[-1] > MOST_PERIODS:
         raise ValueError(
-            f"a window of {metric.span:g} s has too many periods of {f[-1]:g} Hz to integrate over"
+            f"a window of {span:g} s has too many periods of {f[-1]:g} Hz to integrate over"
         )
     edges = [
         np.linspace(a, b, n, endpoint=False) for a, b, n in zip(f[:-1], f[1:], pieces, strict=True)
     ]
-    if metric.name == "rms" and f[0] < metric.above < f[-1]:
-        edges.append(np.array([metric.above]))
+    if f[0] < corner < f[-1]:
+        edges.append(np.array([corner]))
     x = np.unique(np.concatenate([*edges, f[-1:]]))
     nodes, weights = np.polynomial.legendre.leggauss(3)
     half = 0.5 * np.diff(x)[:, None]
     at = (0.5 * (x[1:] + x[:-1]))[:, None] + half * nodes
-    value = make_interp_spline(f, S, k=1)(at.ravel())
-    share = (half * weights).ravel() * weight(metric, at.ravel())
-    return np.tensordot(share, value, axes=1)
+    return at.ravel(), (half * weights).ravel()
 
 
 def checked_density(frequency_hz: np.ndarray, density: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -14,11 +14,17 @@ from quietbus.model.disturbance import on_plate
 from quietbus.model.satellite import Satellite
 from quietbus.spatial.vector import solve_small
 
+CROSS = "line_of_sight_cospectrum"
+
 
 def noise_response(
     satellite: Satellite, small: Vibration, frequency: Float[Array, ""], view: View
 ) -> dict[str, Float[Array, "cmg ..."]]:
-    """One-sided PSD of the outputs at one frequency [Hz], by rotor; the rotors are independent."""
+    """One-sided PSD of the outputs at one frequency [Hz], by rotor; the rotors are independent.
+
+    Under ``CROSS`` what two of a line of sight's components have in common: the real part of their
+    cross-spectrum, of the pairs yz, zx and xy.
+    """
     disturbance, cluster = satellite.disturbance, satellite.cluster
     assert disturbance is not None
     omega = 2.0 * jnp.pi * frequency
@@ -34,7 +40,12 @@ def noise_response(
         each = values.reshape(n, channels, *values.shape[1:])
         return jnp.einsum("jc,jc...->j...", density, jnp.abs(each) ** 2)
 
-    return {name: psd(values) for name, values in seen.items()}
+    image = seen["line_of_sight"]
+    first, second = image[..., jnp.array([1, 2, 0])], image[..., jnp.array([2, 0, 1])]
+    common = (first * second.conj()).real
+    common = common.reshape(n, channels, *common.shape[1:])
+    cross = jnp.einsum("jc,jc...->j...", density, common)
+    return {name: psd(values) for name, values in seen.items()} | {CROSS: cross}
 
 
 def ripple_response(

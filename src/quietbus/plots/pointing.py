@@ -48,7 +48,7 @@ def _stretch(verification: Verification, name: str) -> tuple[float, float]:
 
 
 def powers(motion: ImageMotion, stretch: tuple[float, float]) -> dict[str, Power]:
-    """Mean square [rad^2] of an image motion by frequency: each rotor's line, and the signal.
+    """Mean square [rad^2] of an image motion by frequency: signal, each rotor's lines and noise.
 
     The signal's density is a periodogram with a Hann window, its cubic trend taken off.
     """
@@ -75,6 +75,14 @@ def powers(motion: ImageMotion, stretch: tuple[float, float]) -> dict[str, Power
     others = np.setdiff1d(np.flatnonzero(mean > 0.0), named)
     if len(others) and np.sum(mean[others]) > least:
         parts["other lines"] = LinePower(f[others], mean[others])
+    noise = motion.noise
+    if noise is not None:
+        instants = signal.time[here] if np.any(here) else np.array([0.5 * (start + end)])
+        trace = np.trace(noise.density, axis1=3, axis2=4)
+        mean = np.mean(noise.at(instants, trace), axis=0)
+        for name, density in zip(noise.names, mean.T, strict=True):
+            if np.any(density > 0.0):
+                parts[name] = Density(noise.frequency, density)
     return parts
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.fft
 from scipy.integrate import trapezoid
 
-from quietbus.dynamics.disturbance_response import noise_psd
+from quietbus.dynamics.disturbance_response import CROSS, noise_psd
 from quietbus.dynamics.vibration import Vibration, View
 from quietbus.model.disturbance import Disturbance, Noise
 from quietbus.model.satellite import Satellite
@@ -27,6 +27,8 @@ class Broadband:
     instants: np.ndarray  # (look,) numbers of the output instants
     frequency: np.ndarray  # (f,) [Hz]
     psd: dict[str, np.ndarray]  # (look, f, cmg, ...) by output, unit squared per Hz
+    # (look, f, cmg, line, pair) of lines of sight, real part of the cross-spectra of yz, zx, xy
+    cospectrum: np.ndarray
 
     def variance(self, name: str, count: int) -> np.ndarray:
         """Mean square (n, ...) of an output at instants 0 to ``count`` - 1, all rotors.
@@ -74,8 +76,8 @@ def with_noise(satellite: Satellite, seeds: Sequence[int], duration: float) -> S
 
 def noise_spectra(
     satellite: Satellite, small: Vibration, modes: np.ndarray, view: View
-) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Frequencies (f,) [Hz] and one-sided PSD of the outputs (look, f, cmg, ...) at some instants.
+) -> tuple[np.ndarray, dict[str, np.ndarray], np.ndarray]:
+    """What ``Broadband`` holds, at some instants: frequencies, spectra, co-spectra.
 
     Args:
         small: equations of small vibration, with a leading axis of instants.
@@ -89,7 +91,8 @@ def noise_spectra(
         padded = np.pad(these, (0, CHUNK - len(these)), mode="edge")
         part = noise_psd(satellite, small, jnp.asarray(padded), view)
         parts.append({k: np.asarray(v)[:, : len(these)] for k, v in part.items()})
-    return frequency, {k: np.concatenate([p[k] for p in parts], axis=1) for k in parts[0]}
+    psd = {k: np.concatenate([p[k] for p in parts], axis=1) for k in parts[0]}
+    return frequency, psd, psd.pop(CROSS)
 
 
 def _tables(disturbance: Disturbance) -> list[np.ndarray]:
