@@ -134,7 +134,7 @@ def test_a_sine_with_noise_has_the_quantile_of_their_sum(p):
     expected = brentq(off, 0.0, 20.0)
     for way in ("temporal", "mixed"):
         found = evaluate(motion, Metric("APE"), (1.0, 199.0), Statistic(p, way))
-        assert found == pytest.approx(expected, rel=3e-3)
+        assert found == pytest.approx(expected, rel=6e-3)
 
 
 @pytest.mark.parametrize("components", [1, 2])
@@ -156,7 +156,7 @@ def test_ensemble_is_the_quantile_of_the_largest_value_in_the_stretch(name, comp
 @pytest.mark.parametrize("name", ["APE", "jitter"])
 def test_interpretations_are_ordered_and_grow_with_noise(pair, name):
     loud = pair[0]
-    soft = ImageMotion(loud.signal, loud.lines, flat(0.01 * FLAT))
+    soft = ImageMotion(loud.signal, loud.lines, flat(1e-4 * FLAT))
     silent = ImageMotion(loud.signal, loud.lines)
     which = Metric(name, 0.01, 0.033, 0.0, 0.1)
     values = {
@@ -168,7 +168,7 @@ def test_interpretations_are_ordered_and_grow_with_noise(pair, name):
     }
     for way, (none, little, much) in values.items():
         assert none < 1.001 * little < much, way
-        assert little < 1.35 * none, way
+        assert little < 1.25 * none, way
     assert values["mixed"][2] <= 1.01 * values["temporal"][2] <= 1.02 * values["ensemble"][2]
 
 

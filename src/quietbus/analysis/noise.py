@@ -13,7 +13,7 @@ from scipy.special import ndtr
 
 from quietbus.analysis.windows import Metric, table_weights
 
-ANGLES = 2**17  # of directions, over all deviations together
+ANGLES = 2**15  # of directions, over all deviations together
 NARROW = 1e-4  # of the larger variance: the smaller counts as this in a rate of crossing
 CIRCLE = 4096
 SIGMAS = 40.0  # no quantile is further out
