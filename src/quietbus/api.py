@@ -244,7 +244,10 @@ def verify(
         scenario: a scenario, the path of a scenario file, or a built-in's name.
         method: "harmonic": slow motion and lines, over all rotor phases. "direct": one run with
             every rotor turn resolved, the only member of its ensemble.
-        mount, duration, output_rate, progress: as of ``simulate``.
+        mount: "isolated" or "rigid", instead of the scenario's own.
+        duration: [s], instead of the scenario's own.
+        output_rate: [Hz], as of ``simulate``.
+        progress: called with the simulated time reached [s].
 
     Returns:
         The verdicts; ``to_dict()`` gives them all (docs/pointing.md).
