@@ -7,11 +7,12 @@ import sys
 import matplotlib.image
 import numpy as np
 import pytest
+import xarray as xr
 
 import quietbus as qb
 from quietbus import cli
 from quietbus.plots import pointing_figures
-from quietbus.verification import ARCSEC, _errors, image_motion
+from quietbus.verification import ARCSEC, _errors, image_motion, rotors_of
 
 STILL = {"initial": {"attitude": [0, 0, 0], "steady": True}, "simulation.duration": 0.5}
 # every motion that there is moves this image, each by about as much
@@ -230,3 +231,26 @@ def test_command_says_what_is_wrong_with_the_input(tmp_path, capsys):
     assert "Traceback" not in err
     code, _, err = run(file, "--method", "magic", capsys=capsys)
     assert code == 2
+
+
+def turning_wheels(acceleration):
+    """What a run of the wheels' demo tells of its rotors, at constant acceleration [rad/s^2]."""
+    time, speed = np.linspace(0.0, 10.0, 101)[:, None], np.array([[100.0, 200.0, -150.0, 120.0]])
+    angle = np.array([[0.1, 0.2, 0.3, 0.4]]) + speed * time + 0.5 * acceleration * time**2
+    columns = {"rotor_speed": speed + acceleration * time, "rotor_angle": angle}
+    return xr.Dataset(
+        {name: (("time", "cmg"), values) for name, values in columns.items()},
+        {"time": time[:, 0]},
+    )
+
+
+def test_wheels_are_judged_at_their_speeds_if_these_hold_still():
+    """Angles at t = 0 follow from the run; 200 rad/s that change by 10 rad/s are 4.8 % too many."""
+    demo = qb.load_scenario("wheels-demo")
+    speed, phase = rotors_of(turning_wheels(0.0), demo, None)
+    np.testing.assert_allclose(speed, [100.0, 200.0, -150.0, 120.0], rtol=1e-12)
+    np.testing.assert_allclose(phase, [0.1, 0.2, 0.3, 0.4], atol=1e-9)
+    with pytest.raises(ValueError, match=r"by up to 4.76 % from 0 s to 10 s.*Use method 'direct'"):
+        rotors_of(turning_wheels(1.0), demo, None)
+    slower, _ = rotors_of(turning_wheels(1.0), demo, (9.0, 10.0))  # 0.5 % there
+    np.testing.assert_allclose(slower, [109.5, 209.5, -140.5, 129.5], rtol=1e-12)

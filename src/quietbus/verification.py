@@ -93,7 +93,7 @@ class Verification:
         check_requirements(self.scenario, self.run.attrs["method"], float(time[-1]))
         if self.run.attrs["method"] == "harmonic":
             try:
-                _rotors(self.run, self.scenario, self._judged_time)
+                rotors_of(self.run, self.scenario, self._judged_time)
             except ValueError as error:
                 problem = Problem(str(error), ("requirements",))
                 raise ScenarioError(self.scenario.name, [problem]) from None
@@ -352,7 +352,7 @@ def image_motion(
     orders = run["order"].to_numpy()
     if np.any(run.get("line_of_sight_ripple_amplitude", 0.0)):
         raise ValueError(RIPPLE)
-    speed, phase = _rotors(run, scenario, stretch)
+    speed, phase = rotors_of(run, scenario, stretch)
     lines = Lines(
         amplitude=image.reshape(len(time), -1, image.shape[-1]),
         frequency=np.outer(speed, orders).ravel(),
@@ -363,7 +363,7 @@ def image_motion(
     return ImageMotion(signal, lines, _noise(run, name, line.image()))
 
 
-def _rotors(
+def rotors_of(
     run: xr.Dataset, scenario: Scenario, stretch: tuple[float, float] | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Speeds [rad/s] of the rotors and their angles at t = 0 [rad], as of steady ones.
