@@ -139,7 +139,7 @@ def _growth(satellite: Satellite, slow: Solution) -> str:
     final = jax.tree.map(lambda leaf: np.asarray(leaf)[None], slow.final)
     along = _Along(satellite, np.array([slow.time[-1]]), final)
     _, _, small = along.chunk(np.zeros(1, int), NOTHING_SEEN)
-    return _growing(_eigenvalues(small, 0, np.zeros(1, int))[0], 0.0)
+    return _growing(np.linalg.eigvals(_instant(small, 0).state_matrix()), 0.0)
 
 
 def on_periodic_solution(satellite: Satellite, state: State) -> State:
@@ -237,7 +237,7 @@ def _jitter_at(satellite: Satellite, state: State) -> tuple[Vibration, np.ndarra
     """Equations of small vibration at t = 0 and xi (cmg, order, 12)."""
     states = jax.tree.map(lambda leaf: np.asarray(leaf)[None], state)
     _, xi, small = _Along(satellite, np.zeros(1), states).chunk(np.zeros(1, int), NOTHING_SEEN)
-    small = jax.tree.map(lambda leaf: leaf[0], small)
+    small = _instant(small, 0)
     modes = np.linalg.eigvals(small.state_matrix())
     refuse_resonance(satellite, "at t = 0 s", modes, np.asarray(small.slow.rotor_speed))
     return small, xi[0]
@@ -386,11 +386,12 @@ def respond(
                     name, np.empty((len(time), *value.shape[1:]), value.dtype)
                 )
                 whole[these] = value
-            modes |= _eigenvalues(small, start, np.intersect1d(looks, these))
             if satellite.motor is not None:
-                ripple.append(jax.tree.map(np.asarray, ripple_lines(satellite, small, view)))
-            for look in np.intersect1d(looks, these):
-                looked[int(look)] = _instant(small, int(look) - start)
+                lines = ripple_lines(satellite, small, view)
+                ripple.append({name: np.asarray(v)[: len(these)] for name, v in lines.items()})
+            for look in np.intersect1d(looks, these).tolist():
+                looked[look] = _instant(small, look - start)
+                modes[look] = np.linalg.eigvals(looked[look].state_matrix())
             done = int(these[-1]) + 1
             if progress is not None:
                 progress(float(time[done - 1]))
@@ -444,7 +445,8 @@ def _broadband(satellite, looked, modes, view) -> Broadband | None:
 
 
 def _instant(small: Vibration, k: int) -> Vibration:
-    return jax.tree.map(lambda leaf: leaf[k], small)
+    """The equations at one instant of a chunk (NumPy)."""
+    return jax.tree.map(lambda leaf: np.asarray(leaf)[k], small)
 
 
 Chunk = tuple[dict[str, np.ndarray], np.ndarray, Vibration]
@@ -460,13 +462,16 @@ class _Along:
         self._sample_legs()
 
     def chunk(self, instants: np.ndarray, view: View) -> Chunk:
-        """Complex amplitudes (instant, cmg, order, ...) and the equations that they solve."""
+        """Complex amplitudes (instant, cmg, order, ...) and the equations that they solve.
+
+        Of the equations there may be more than instants, as the last one is repeated.
+        """
         t, states = self._at(instants, INSTANTS)
         legs = self._legs(instants)
         legs = np.concatenate([legs, np.repeat(legs[-1:], len(t) - len(legs), axis=0)])
-        result = _compiled_chunk(self.satellite, t, states, legs, view, self.one_speed)
-        trimmed: Chunk = jax.tree.map(lambda leaf: np.asarray(leaf)[: len(instants)], result)
-        return trimmed
+        values, xi, small = _compiled_chunk(self.satellite, t, states, legs, view, self.one_speed)
+        count = len(instants)
+        return {k: np.asarray(v)[:count] for k, v in values.items()}, np.asarray(xi)[:count], small
 
     def _at(self, instants, size):
         """Time and states at instants, the last one repeated to a size that programs share."""
@@ -567,14 +572,6 @@ def _compiled_chunk(satellite, t, states, legs, view, one_speed):
         return views(s, xi), xi, small
 
     return jax.vmap(one)(t, states, legs)
-
-
-def _eigenvalues(small: Vibration, start: int, looks: np.ndarray) -> dict[int, np.ndarray]:
-    """Eigenvalues [rad/s] of the controlled satellite at instants of a chunk."""
-    if not looks.size:
-        return {}
-    matrices = np.stack([_instant(small, look - start).state_matrix() for look in looks])
-    return dict(zip(looks.tolist(), np.linalg.eigvals(matrices), strict=True))
 
 
 def refuse_resonance(
