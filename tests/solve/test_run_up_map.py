@@ -28,11 +28,15 @@ def run_up(seconds, damping):
 
 @pytest.mark.slow
 def test_a_slow_run_up_follows_the_map_the_closer_the_slower():
-    """The lag of an amplitude that changes at the rate a is a over the damping of the mode."""
+    """The lag of an amplitude that changes at the rate a is a over the damping of the mode.
+
+    About z there is none to speak of, and a few per mille are left by the average over four turns.
+    """
     errors = np.array([run_up(seconds, 500.0).error for seconds in (40.0, 160.0)])
     assert np.max(errors[0]) < 0.15
     assert np.max(errors[1]) < 0.04
-    assert np.all(errors[1] < 0.4 * errors[0])
+    assert np.all(errors[1] < np.maximum(0.4 * errors[0], 0.003))
+    assert np.all(errors[0][:2] > 0.05)
 
 
 @pytest.mark.slow
