@@ -19,7 +19,7 @@ from quietbus.reproduce.claims import Claim
 from quietbus.reproduce.pages import report_page, table_page
 
 Tell = Callable[[str, float], None]  # what is being done, and how far it is, 0 to 1
-NOT_COMPUTED_WITH = ("cli.py", "tables.py", "report")  # sources that no number depends on
+NOT_COMPUTED_WITH = ("cli", "tables.py", "report")  # sources that no number depends on
 LIBRARIES = ("jax", "diffrax", "equinox", "numpy", "scipy", "matplotlib", "control", "mujoco")
 
 

@@ -1,0 +1,49 @@
+"""The application, on which each family of commands registers its own, and the entry point."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+
+from quietbus.cli.given import Asked
+from quietbus.cli.guard import BAD_INPUT, BadInput
+from quietbus.cli.session import on_interrupt
+
+ORDER = ("init", "simulate", "compare", "plot", "report", "analyze", "jitter", "verify")
+ORDER += ("import", "fit", "validate", "reproduce")
+
+
+class _InOrderOfWork(TyperGroup):
+    """Commands as an engineer comes to need them."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        return sorted(super().list_commands(ctx), key=ORDER.index)
+
+
+app = typer.Typer(
+    cls=_InOrderOfWork,
+    name="quietbus",
+    help="Design, simulate and verify vibration isolation platforms for CMGs on satellites.",
+    no_args_is_help=True,
+    pretty_exceptions_show_locals=False,
+    rich_markup_mode=None,
+)
+
+
+def main() -> None:
+    """Entry point: one clear message for bad input, no traceback; Ctrl-C ends with status 1."""
+    signal.signal(signal.SIGINT, on_interrupt)
+    try:
+        app()
+    except Exception as error:
+        from quietbus.scenario import ScenarioError  # here, so that --help need not load it
+
+        if not isinstance(error, ScenarioError | BadInput):
+            raise
+        told = Asked.told(error) if isinstance(error, ScenarioError) else error
+        print(f"quietbus: {told}", file=sys.stderr)
+        sys.exit(BAD_INPUT)

@@ -1,0 +1,85 @@
+"""Commands of measured rotors: import, fit."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from quietbus.cli.app import app
+from quietbus.cli.given import OUT, FolderOption, JsonOption
+from quietbus.cli.guard import BadInput, check_file, make_folder
+from quietbus.cli.session import print_table, status
+from quietbus.cli.written import write_study
+
+
+@app.command("import")
+def import_(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="CSV, S2E's .ini or .csv, 42's Whl_*.txt.")
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="YAML file, replaced if old; default: print."),
+    ] = None,
+    kind: Annotated[
+        str | None, typer.Option(help="radial_force, ...; where the file does not say it.")
+    ] = None,
+) -> None:
+    """A harmonic table of a rotor as the scenario's block `disturbance`."""
+    from quietbus.scenario import read_wheel_table
+    from quietbus.scenario.wheel_files import KINDS
+
+    if kind is not None and kind not in KINDS:
+        raise BadInput(f"--kind: expected one of {', '.join(KINDS)}, got '{kind}'")
+    table = read_wheel_table(file, kind)
+    for lost in table.lost:
+        print(f"note: not taken over: {lost}", file=sys.stderr)
+    for note in table.notes:
+        print(f"note: {note}", file=sys.stderr)
+    _write_block(table.to_yaml(), output)
+
+
+def _write_block(text: str, output: Path | None) -> None:
+    if output is None:
+        print(text, end="")
+        return
+    check_file(output)
+    output.write_text(text, encoding="utf-8")
+    print(f"wrote {output}")
+
+
+@app.command()
+def fit(
+    file: Annotated[
+        Path, typer.Argument(metavar="MAP", help="A measured waterfall, CSV or NetCDF.")
+    ],
+    output: FolderOption = OUT,
+    as_json: JsonOption = False,
+    most: Annotated[int, typer.Option(min=1, help="Orders looked for in each component.")] = 20,
+) -> None:
+    """Fit orders, resonances and broadband floor to a measured speed-frequency map of a rotor."""
+    from quietbus.analysis.waterfall import FitError
+    from quietbus.measured import fit_waterfall
+
+    if not as_json:
+        make_folder(output)
+    try:
+        with status() as tell:
+            tell("fitting")
+            fitted = fit_waterfall(file, most)
+    except FitError as error:
+        raise BadInput(f"{file}: {error}") from None
+    if as_json:
+        print(json.dumps(fitted.to_dict(), indent=2, allow_nan=False))
+        return
+    from quietbus.plots.waterfall import waterfall_figures
+    from quietbus.tables import fit_tables
+
+    for table in fit_tables(fitted):
+        print_table(table)
+    (output / "disturbance.yaml").write_text(fitted.to_yaml(), encoding="utf-8")
+    write_study("fit", fitted.to_dict(), lambda: waterfall_figures(fitted), output)

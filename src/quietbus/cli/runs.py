@@ -1,0 +1,200 @@
+"""Commands of runs: simulate, compare, plot, report."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from quietbus.cli.app import app
+from quietbus.cli.given import (
+    OUT,
+    DurationOption,
+    FolderOption,
+    Method,
+    Mount,
+    ScenarioArgument,
+    load,
+)
+from quietbus.cli.guard import BadInput, check_file, fail, make_folder
+from quietbus.cli.scenarios import checks_of, fail_unless_passed
+from quietbus.cli.session import (
+    Stop,
+    import_heavy,
+    keeping_results,
+    notes,
+    print_table,
+    progress,
+)
+from quietbus.cli.written import save
+
+
+@app.command()
+def simulate(
+    scenario: ScenarioArgument,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="NetCDF file; default NAME-MOUNT.nc, replaced if old."),
+    ] = None,
+    method: Annotated[
+        Method, typer.Option(help="direct: every rotor turn; harmonic: slow motion and jitter.")
+    ] = Method.direct,
+    mount: Annotated[Mount | None, typer.Option(help="Instead of the scenario's mount.")] = None,
+    duration: DurationOption = None,
+    output_rate: Annotated[
+        str | None,
+        typer.Option(help="'200 Hz', instead of the scenario's (direct) or 10 Hz (harmonic)."),
+    ] = None,
+    joint_forces: Annotated[
+        bool, typer.Option("--joint-forces", help="Also keep the forces in the legs' joints.")
+    ] = False,
+) -> None:
+    """Simulate a scenario; write the run and print what one wants to know of it."""
+    checked = load(scenario, mount, duration, output_rate)
+    import_heavy()
+    from quietbus import api
+    from quietbus.results import summarize
+    from quietbus.solve.harmonic import ResonanceError
+    from quietbus.tables import summary_table
+
+    chosen = checked.isolator.mount
+    name = f"{re.sub(r'[^A-Za-z0-9._-]+', '-', checked.name)}-{chosen}"
+    output = output or Path(f"{name}-harmonic.nc" if method == Method.harmonic else f"{name}.nc")
+    check_file(output)
+    if joint_forces and method == Method.harmonic:
+        raise BadInput("--joint-forces needs --method direct")
+    if joint_forces and chosen == Mount.rigid:
+        raise BadInput("--joint-forces needs the isolated mount: a rigid one leaves them open")
+    failed = ""
+    with keeping_results():
+        with progress({chosen: checked.simulation.duration}) as tell, notes():
+            try:
+                run = api.simulate(
+                    checked,
+                    method.value,
+                    output_rate=checked.simulation.output_rate if output_rate else None,
+                    joint_forces=joint_forces,
+                    progress=lambda t: tell(chosen, t),
+                )
+            except api.SimulationError as error:
+                run, failed = error.run, str(error)
+            except ResonanceError as error:
+                raise BadInput(f"{scenario}: {error}") from None
+        troubles = save(run, output)
+    if run.sizes["time"] > 1:
+        print_table(summary_table({chosen: summarize(run)}))
+    else:
+        print("one instant only, so there is no table")
+    if run.attrs["status"] != "complete":
+        troubles.append(f"the run is not complete: {run.attrs['stop_reason']}")
+    elif failed:
+        troubles.append(failed)
+    if troubles:
+        fail("; ".join(troubles))
+
+
+@app.command()
+def compare(
+    scenario: ScenarioArgument,
+    output: FolderOption = OUT,
+    duration: DurationOption = None,
+) -> None:
+    """Simulate with the isolator and without, side by side, with pictures."""
+    checked = load(scenario, None, duration)
+    make_folder(output)
+    import_heavy()
+    from quietbus import api
+    from quietbus.plots import compare_figures, run_figures, save_figures
+    from quietbus.results import summarize
+    from quietbus.tables import summary_table
+
+    with keeping_results():
+        with progress(dict.fromkeys(Mount, checked.simulation.duration)) as tell, notes():
+            runs = api.compare(checked, progress=tell)
+        troubles = []
+        for mount, run in runs.items():
+            troubles += save(run, output / f"{mount}.nc")
+            if run.attrs["status"] != "complete":
+                troubles.append(f"the {mount} run is not complete: {run.attrs['stop_reason']}")
+    if Stop.asked:
+        print(f"no pictures of an interrupted comparison; `quietbus plot {output}/isolated.nc`")
+    elif all(run.sizes["time"] > 1 for run in runs.values()):
+        summaries = {str(mount): summarize(run) for mount, run in runs.items()}
+        print_table(summary_table(summaries))
+        numbers = {mount: summary.to_dict() for mount, summary in summaries.items()}
+        (output / "summary.json").write_text(json.dumps(numbers, indent=2) + "\n")
+        figures = compare_figures(runs) | {
+            f"{mount}-{name}": figure
+            for mount, run in runs.items()
+            for name, figure in run_figures(run).items()
+        }
+        save_figures(figures, output)
+        print(f"wrote summary.json and {len(figures)} pictures to {output}/")
+    else:
+        print("one instant only, so there are no table and no pictures")
+    if troubles:
+        fail("; ".join(troubles))
+
+
+@app.command()
+def plot(
+    run: Annotated[Path, typer.Argument(metavar="RUN.nc", help="A run of `quietbus simulate`.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder; default RUN's name.")
+    ] = None,
+    suffix: Annotated[str, typer.Option("--format", help="png, svg or pdf.")] = "png",
+) -> None:
+    """Draw the pictures of a run."""
+    if suffix not in ("png", "svg", "pdf"):
+        raise BadInput(f"--format: expected png, svg or pdf, got '{suffix}'")
+    from quietbus.plots import run_figures, save_figures
+    from quietbus.results import load_run
+
+    try:
+        loaded = load_run(run)
+    except (FileNotFoundError, ValueError) as error:
+        raise BadInput(str(error)) from None
+    folder = output or run.with_suffix("")
+    make_folder(folder)
+    for path in save_figures(run_figures(loaded), folder, f".{suffix}"):
+        print(f"wrote {path}")
+
+
+@app.command()
+def report(
+    run: Annotated[Path, typer.Argument(metavar="RUN.nc", help="A run of `quietbus simulate`.")],
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="HTML file; default RUN's name, replaced if old."),
+    ] = None,
+    check: Annotated[
+        bool, typer.Option("--validate", help="Also check the run's scenario, as `validate` does.")
+    ] = False,
+) -> None:
+    """Write a run as one HTML page: numbers, interactive pictures, scenario, provenance."""
+    from quietbus.results import load_run, scenario_of
+
+    try:
+        loaded = load_run(run)
+    except (FileNotFoundError, ValueError) as error:
+        raise BadInput(str(error)) from None
+    scenario = scenario_of(loaded)
+    page = output or run.with_suffix(".html")
+    check_file(page)
+    if page.resolve() == run.resolve():
+        raise BadInput(f"{page}: is the run itself; expected another name for the page")
+    try:
+        from quietbus.report import write_report
+
+        checks = checks_of(scenario, None) if check else None
+    except ImportError as error:
+        fail(str(error))
+    try:
+        write_report(loaded, page, checks)
+    except OSError as error:
+        fail(f"{page}: cannot be written: {error.strerror or error}")
+    print(f"wrote {page}")
+    fail_unless_passed(checks or [])

@@ -1,0 +1,82 @@
+"""Commands of scenarios: init, validate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from quietbus.cli.app import app
+from quietbus.cli.given import Mount, ScenarioArgument, load
+from quietbus.cli.guard import BadInput, check_file, check_folder, fail
+from quietbus.cli.session import import_heavy, print_table, status
+
+if TYPE_CHECKING:
+    from quietbus.scenario import Scenario
+    from quietbus.validate import Check
+
+
+@app.command()
+def init(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The scenario file to write.")],
+) -> None:
+    """Write a commented scenario to start from."""
+    from quietbus.scenario import template_text
+
+    check_folder(file.parent)
+    try:
+        with file.open("x", encoding="utf-8") as new:
+            new.write(template_text())
+    except FileExistsError:
+        raise BadInput(f"{file}: exists already; choose another name") from None
+    except OSError as error:
+        raise BadInput(f"{file}: cannot be written: {error.strerror}") from None
+    print(f"wrote {file}; next: quietbus compare {file}")
+
+
+@app.command()
+def validate(
+    scenario: ScenarioArgument,
+    export: Annotated[
+        Path | None, typer.Option(help="Also write the satellite as a MuJoCo model (XML).")
+    ] = None,
+    mount: Annotated[Mount | None, typer.Option(help="Instead of the scenario's mount.")] = None,
+) -> None:
+    """Check a scenario against an independent engine (MuJoCo) and conservation laws."""
+    checked = load(scenario, mount, None)
+    if export is not None:
+        check_file(export)
+    from quietbus.tables import checks_table
+
+    try:
+        checks = checks_of(checked, export)
+    except ImportError as error:
+        fail(str(error))
+    print_table(checks_table(f"{checked.name}, {checked.isolator.mount}", checks))
+    fail_unless_passed(checks)
+    print(f"all {len(checks)} checks passed (errors are relative)")
+
+
+def checks_of(scenario: Scenario, export: Path | None) -> list[Check]:
+    """Check a scenario, and write it as a MuJoCo model if wanted; ImportError without MuJoCo."""
+    import_heavy()
+    from quietbus import validate as checking
+    from quietbus.build import build_initial_state, build_satellite
+
+    satellite = build_satellite(scenario)
+    state = build_initial_state(scenario, satellite)
+    if export is not None:
+        export.write_text(checking.write_mjcf(satellite, state), encoding="utf-8")
+        print(f"wrote {export}")
+    if satellite.disturbance is not None or satellite.motor is not None:
+        print("checked without the rotors' disturbances and the gimbal motors' ripple")
+    with status() as tell:
+        return checking.validate(satellite, state, progress=tell)
+
+
+def fail_unless_passed(checks: Sequence[Check]) -> None:
+    failed = [check.name for check in checks if not check.passed]
+    if failed:
+        fail(f"{len(failed)} of {len(checks)} checks failed: {', '.join(failed)}")

@@ -1,0 +1,128 @@
+"""What a command shows while it works, and how Ctrl-C stops it."""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from quietbus.cli.guard import FAILED
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+
+class Stop:
+    """What Ctrl-C does. Set as a flag: an exception in the middle of JAX would be lost or worse."""
+
+    keeping = False  # a run is under way, whose results are to be kept
+    asked = False
+
+
+def on_interrupt(_signal: int, _frame: object) -> None:
+    # os.write, since Python's own buffers may be in use where the signal comes in between
+    if Stop.keeping and not Stop.asked:
+        Stop.asked = True
+        os.write(
+            2, b"\nquietbus: stopping and keeping what is computed; Ctrl-C again quits at once\n"
+        )
+        return
+    os.write(2, b"\nquietbus: interrupted\n")
+    os._exit(FAILED)
+
+
+@contextmanager
+def keeping_results() -> Iterator[None]:
+    """From here the first Ctrl-C stops the run, not the program."""
+    Stop.keeping, Stop.asked = True, False
+    try:
+        yield
+    finally:
+        Stop.keeping = False
+
+
+def import_heavy() -> None:
+    """JAX takes a second or two to load; say so."""
+    if sys.stderr.isatty():
+        with status() as tell:
+            tell("loading JAX")
+            import quietbus.api
+    import quietbus.api  # noqa: F401
+
+
+@contextmanager
+def progress(runs: Mapping[str, float]) -> Iterator[Callable[[str, float], None]]:
+    """A bar per run on standard error: simulated time, remaining time."""
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        TextColumn("{task.description:>22}"),
+        BarColumn(),
+        TextColumn("{task.completed:g} of {task.total:g} s"),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True)) as bars:
+        tasks = {run: bars.add_task(f"{run}: compiling", total=t) for run, t in runs.items()}
+
+        def tell(run: str, t: float) -> None:
+            bars.update(tasks[run], completed=t, description=run)
+            if Stop.asked:
+                raise KeyboardInterrupt
+
+        yield tell
+
+
+@contextmanager
+def fraction() -> Iterator[Callable[[str, float], None]]:
+    """A bar on standard error for one thing after the other, each from 0 to 1."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description:>40}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True)) as bars:
+        task = bars.add_task("", total=1.0)
+
+        def tell(what: str, fraction: float) -> None:
+            bars.update(task, completed=fraction, description=what)
+            if Stop.asked:
+                raise KeyboardInterrupt
+
+        yield tell
+
+
+@contextmanager
+def status() -> Iterator[Callable[[str], None]]:
+    """A line on standard error that says what is being done."""
+    from rich.console import Console
+
+    with Console(stderr=True).status("") as status:
+        yield lambda text: status.update(text)
+
+
+@contextmanager
+def notes() -> Iterator[None]:
+    """Warnings of the package as notes on standard error, after the progress bars."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield
+    for warning in caught:
+        if warning.category.__name__ == "QuietbusWarning":
+            print(f"note: {warning.message}", file=sys.stderr)
+
+
+def print_table(table: Table) -> None:
+    from rich.console import Console
+
+    Console().print(table)

@@ -1,0 +1,159 @@
+"""Commands that answer questions of a design: analyze, jitter, verify."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from quietbus.cli.app import app
+from quietbus.cli.given import (
+    OUT,
+    AnglesOption,
+    DurationOption,
+    FolderOption,
+    JsonOption,
+    Method,
+    Mount,
+    ScenarioArgument,
+    at_angles,
+    load,
+    speed,
+)
+from quietbus.cli.guard import BadInput, fail, make_folder
+from quietbus.cli.session import import_heavy, notes, print_table, progress, status
+from quietbus.cli.written import write_study
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from quietbus.jitter_study import JitterStudy
+    from quietbus.study import Study
+
+
+@app.command()
+def analyze(
+    scenario: ScenarioArgument,
+    output: FolderOption = OUT,
+    as_json: JsonOption = False,
+    gimbal_angles: AnglesOption = None,
+) -> None:
+    """Modes, isolator channels, gain range and margins: per axis and of the whole satellite."""
+    checked = at_angles(load(scenario, None, None), gimbal_angles)
+    if not as_json:
+        make_folder(output)
+    import_heavy()
+    from quietbus import api
+    from quietbus.dynamics.linearize import OperatingPointError
+
+    try:
+        study = api.analyze(checked)
+        if as_json:
+            print(json.dumps(study.to_dict(), indent=2, allow_nan=False))
+            return
+        _print_analysis(study, output)
+    except OperatingPointError as error:
+        raise BadInput(f"{scenario}: {error}") from None
+
+
+def _print_analysis(study: Study, output: Path) -> None:
+    from quietbus.plots import analysis_figures
+    from quietbus.tables import analysis_tables
+
+    for part in analysis_tables(study):
+        print(part) if isinstance(part, str) else print_table(part)
+    write_study("analysis", study.to_dict(), lambda: analysis_figures(study), output)
+
+
+@app.command()
+def jitter(
+    scenario: ScenarioArgument,
+    output: FolderOption = OUT,
+    as_json: JsonOption = False,
+    gimbal_angles: AnglesOption = None,
+    max_speed: Annotated[
+        str | None,
+        typer.Option(help="'7000 rpm' of the fastest rotor, end of the sweep; default 1.2 x own."),
+    ] = None,
+) -> None:
+    """Jitter at each rotor order with the isolator and without, and over the rotors' speed."""
+    checked = at_angles(load(scenario, None, None), gimbal_angles)
+    most = None if max_speed is None else speed(max_speed)
+    if not as_json:
+        make_folder(output)
+    import_heavy()
+    from quietbus import api
+
+    try:
+        with status() as tell:
+            tell("computing (compiles for some seconds the first time)")
+            study = api.jitter(checked)
+            numbers = study.to_dict(most)
+    except ValueError as error:
+        raise BadInput(f"{scenario}: {error}") from None
+    if as_json:
+        print(json.dumps(numbers, indent=2, allow_nan=False))
+        return
+    from quietbus.tables import jitter_tables
+
+    for table in jitter_tables(numbers):
+        print_table(table)
+    write_study("jitter", numbers, lambda: _jitter_pictures(study, most), output)
+
+
+def _jitter_pictures(study: JitterStudy, max_speed: float | None) -> dict[str, Figure]:
+    from quietbus.plots import jitter_figures, sweep_figures
+
+    figures = jitter_figures(study)
+    if not study.frequency.any():  # no rotor turns
+        return figures
+    return figures | sweep_figures(study.sweep(max_speed), study.scenario.name)
+
+
+@app.command()
+def verify(
+    scenario: ScenarioArgument,
+    output: FolderOption = OUT,
+    as_json: JsonOption = False,
+    method: Annotated[
+        Method,
+        typer.Option(help="harmonic: over all rotor phases; direct: one run, every rotor turn."),
+    ] = Method.harmonic,
+    mount: Annotated[Mount | None, typer.Option(help="Instead of the scenario's mount.")] = None,
+    duration: DurationOption = None,
+) -> None:
+    """Judge the scenario's pointing requirements: value, margin, verdict. Status 1: one not met."""
+    checked = load(scenario, mount, duration)
+    if not checked.requirements:
+        from quietbus.scenario.pointing import NO_REQUIREMENTS
+
+        raise BadInput(f"{scenario}: requirements: {NO_REQUIREMENTS}")
+    if not as_json:
+        make_folder(output)
+    import_heavy()
+    from quietbus import api
+    from quietbus.solve.harmonic import ResonanceError
+
+    try:
+        with progress({method.value: checked.simulation.duration}) as tell, notes():
+            verification = api.verify(
+                checked, method.value, progress=lambda t: tell(method.value, t)
+            )
+    except api.SimulationError as error:
+        fail(str(error))
+    except ResonanceError as error:
+        raise BadInput(f"{scenario}: {error}") from None
+    numbers = verification.to_dict()
+    if as_json:
+        print(json.dumps(numbers, indent=2, allow_nan=False))
+    else:
+        from quietbus.plots import pointing_figures
+        from quietbus.tables import verification_tables
+
+        for part in verification_tables(numbers):
+            print(part) if isinstance(part, str) else print_table(part)
+        write_study("verification", numbers, lambda: pointing_figures(verification), output)
+    missed = [f"{v.name} of {v.line_of_sight}" for v in verification.verdicts if not v.met]
+    if missed:
+        fail(f"{len(missed)} of {len(verification.verdicts)} not met: {'; '.join(missed)}")
