@@ -13,8 +13,10 @@ from quietbus.cli.given import Asked
 from quietbus.cli.guard import BAD_INPUT, BadInput
 from quietbus.cli.session import on_interrupt
 
-ORDER = ("init", "simulate", "compare", "plot", "report", "analyze", "jitter", "verify")
-ORDER += ("import", "fit", "validate", "reproduce")
+ORDER = [
+    *("init", "simulate", "compare", "plot", "report", "analyze", "jitter", "verify"),
+    *("import", "fit", "validate", "reproduce"),
+]
 
 
 class _InOrderOfWork(TyperGroup):
