@@ -16,7 +16,7 @@ from quietbus.model.variants import balanced
 
 
 class Outputs(eqx.Module):
-    """Quantities at one instant; names, frames and units as in the results (``results.py``)."""
+    """Quantities at one instant; names, frames and units as in the results (``results.schema``)."""
 
     bus_position: Float[Array, "3"]
     bus_velocity: Float[Array, "3"]

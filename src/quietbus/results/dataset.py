@@ -1,0 +1,214 @@
+"""Solutions as labelled data, with units, meanings and provenance."""
+
+import datetime
+import importlib.metadata
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from quietbus.analysis.jitter import combine
+from quietbus.dynamics.outputs import Outputs
+from quietbus.results.origin import rotors
+from quietbus.results.schema import (
+    COMBINED,
+    DIMENSIONS,
+    JITTER_VARIABLES,
+    JOINT_VARIABLES,
+    PAIRS,
+    ROTOR_VARIABLES,
+    VARIABLES,
+)
+from quietbus.scenario import Scenario
+from quietbus.solve.direct import SLOW, Scheme, Solution
+from quietbus.solve.harmonic import TOLERANCES, HarmonicSolution, Jitter
+
+
+def to_dataset(
+    scenario: Scenario,
+    solution: Solution | HarmonicSolution,
+    wall_time: float,
+    points: Mapping[str, Any] | None = None,
+    lines_of_sight: Mapping[str, Any] | None = None,
+) -> xr.Dataset:
+    """A run as a dataset.
+
+    Args:
+        scenario: as it was run, mount and output rate included.
+        wall_time: [s].
+        points, lines_of_sight: what a harmonic run looked at, by name.
+    """
+    jitter = solution.jitter if isinstance(solution, HarmonicSolution) else None
+    tolerances: Any = scenario.simulation.tolerances
+    if isinstance(solution, HarmonicSolution):
+        solution, tolerances = solution.slow, TOLERANCES
+    data = {
+        name: _variable(getattr(solution.outputs, name), *VARIABLES[name]) for name in VARIABLES
+    }
+    data |= {
+        name: _variable(getattr(solution.outputs, name), *description)
+        for name, description in ROTOR_VARIABLES.items()
+        if getattr(solution.outputs, name) is not None
+    }
+    joints = solution.outputs.joint_forces
+    if joints is not None:
+        data |= {
+            name: _variable(getattr(joints, name), *description)
+            for name, description in JOINT_VARIABLES.items()
+        }
+    if jitter is not None:
+        data |= _jitter_variables(*_rotor_lines(scenario, solution.outputs), jitter)
+    counted = {"cmg": solution.outputs.gimbal_angle, "leg": solution.outputs.leg_stroke}
+    coordinates = {
+        "time": ("time", solution.time, {"units": "s", "long_name": "time"}),
+        **{
+            name: (dimension, values, {"long_name": meaning})
+            for name, (dimension, values, meaning) in DIMENSIONS.items()
+        },
+        **{
+            name: (name, np.arange(values.shape[1]), {"long_name": f"number of the {name}"})
+            for name, values in counted.items()
+        },
+    }
+    if jitter is not None:
+        if jitter.ripple is not None:
+            lines = list(_ripple_lines(scenario))
+            meaning = "multiple of the gimbal angle"
+            coordinates["ripple"] = ("ripple", lines, {"long_name": meaning})
+        if jitter.broadband is not None:
+            noise = jitter.broadband
+            coordinates["look"] = (
+                "look",
+                solution.time[noise.instants],
+                {"units": "s", "long_name": "time of a spectrum"},
+            )
+            coordinates["frequency"] = (
+                "frequency",
+                noise.frequency,
+                {"units": "Hz", "long_name": "frequency"},
+            )
+            if noise.cospectrum.size:
+                coordinates["pair"] = ("pair", list(PAIRS), {"long_name": "two components"})
+        coordinates["order"] = (
+            "order",
+            list(scenario.cluster.orders),
+            {"long_name": "multiple of rotor speed"},
+        )
+        for dimension, named in (("point", points), ("line", lines_of_sight)):
+            if named:
+                coordinates[dimension] = (dimension, list(named), {"long_name": dimension})
+    status = (
+        "interrupted" if solution.interrupted else "stopped" if solution.stopped else "complete"
+    )
+    scheme = Scheme() if jitter is None else SLOW
+    attributes = {
+        "title": f"{scenario.name}, {scenario.isolator.mount}",
+        "scenario": scenario.to_yaml(),
+        "mount": scenario.isolator.mount,
+        "method": "direct" if jitter is None else "harmonic",
+        "status": status,
+        "stop_reason": solution.stopped or "",
+        "quietbus_version": importlib.metadata.version("quietbus"),
+        "solver": f"diffrax {importlib.metadata.version('diffrax')} {scheme.solver.__name__}",
+        "relative_tolerance": tolerances.relative,
+        "absolute_tolerance": tolerances.absolute,
+        "steps": solution.steps,
+        "rejected_steps": solution.rejected,
+        "wall_time_s": wall_time,
+        "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+    }
+    return xr.Dataset(data, coordinates, attributes)
+
+
+def _rotor_lines(scenario: Scenario, outputs: Outputs) -> tuple[np.ndarray, np.ndarray]:
+    """Frequency and phase of each order (..., cmg, order), over time where speeds change."""
+    (speed, phase), orders = rotors(scenario), np.array(scenario.cluster.orders)
+    if outputs.rotor_speed is not None:
+        speed, phase = np.asarray(outputs.rotor_speed), np.asarray(outputs.rotor_angle)
+    return speed[..., None] * orders, phase[..., None] * orders
+
+
+def _jitter_variables(frequency: np.ndarray, angle: np.ndarray, jitter: Jitter) -> dict[str, Any]:
+    """Amplitudes, phases and what combines them, of every output that has components."""
+    data = {
+        "jitter_change_error": _variable(
+            jitter.change_error, (), "1", "estimated error of the jitter by the motion's change"
+        )
+    }
+    for name, (inner, unit, meaning) in JITTER_VARIABLES.items():
+        values = jitter.amplitudes[name]
+        if not values.size:
+            continue
+        of = f"jitter of the {meaning}"
+        dimensions = ("cmg", "order", *inner)
+        data[f"{name}_jitter_amplitude"] = _variable(
+            np.abs(values), dimensions, unit, f"{of}: amplitude"
+        )
+        data[f"{name}_jitter_phase"] = _variable(
+            np.angle(values), dimensions, "rad", f"{of}: phase against order times rotor angle"
+        )
+        flat = values.reshape(*values.shape[:3], -1)
+        combined = combine(flat, frequency, angle)
+        if jitter.ripple is not None:
+            lines = jitter.ripple[name]
+            data |= _ripple_variables(name, lines, inner, unit, of)
+            combined = combined.with_lines(lines.reshape(len(lines), -1, flat.shape[-1]))
+        if jitter.broadband is not None:
+            psd = jitter.broadband.psd[name]
+            data[f"{name}_psd"] = (
+                ("look", "frequency", "cmg", *inner),
+                psd,
+                {"units": _per_hertz(unit), "long_name": f"{of}: one-sided PSD by rotor noise"},
+            )
+            square = jitter.broadband.variance(name, len(values))
+            combined = combined.with_noise(square.reshape(len(values), -1))
+            data[f"{name}_noise_rms"] = _variable(
+                np.sqrt(square), inner, unit, f"{of}: RMS of the rotors' noise"
+            )
+        for kind, said in COMBINED.items():
+            whole = getattr(combined, kind).reshape(len(values), *values.shape[3:])
+            data[f"{name}_jitter_{kind}"] = _variable(whole, inner, unit, f"{of}: {said}")
+    if jitter.broadband is not None and jitter.broadband.cospectrum.size:
+        data["line_of_sight_cospectrum"] = (
+            ("look", "frequency", "cmg", "line", "pair"),
+            jitter.broadband.cospectrum,
+            {
+                "units": _per_hertz("rad"),
+                "long_name": "real part of the one-sided cross-spectrum of two components of a "
+                "line of sight's jitter by rotor noise",
+            },
+        )
+    return data
+
+
+def _per_hertz(unit: str) -> str:
+    return f"({unit})^2/Hz"
+
+
+def _ripple_variables(
+    name: str, lines: np.ndarray, inner: tuple[str, ...], unit: str, of: str
+) -> dict[str, Any]:
+    """Amplitudes and phases of what the gimbal motors cause."""
+    dimensions = ("cmg", "ripple", *inner)
+    return {
+        f"{name}_ripple_amplitude": _variable(
+            np.abs(lines), dimensions, unit, f"{of} by gimbal motors: amplitude"
+        ),
+        f"{name}_ripple_phase": _variable(
+            np.angle(lines),
+            dimensions,
+            "rad",
+            f"{of} by gimbal motors: phase against ripple times gimbal angle",
+        ),
+    }
+
+
+def _ripple_lines(scenario: Scenario) -> tuple[int, ...]:
+    """Multiples of the gimbal angle of the gimbal motors' lines, as of ``GimbalMotor.order``."""
+    motor = scenario.cluster.gimbal_motor
+    return motor.lines if motor else ()
+
+
+def _variable(values, dimensions, unit, meaning):
+    return ("time", *dimensions), values, {"units": unit, "long_name": meaning}

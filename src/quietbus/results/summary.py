@@ -1,0 +1,129 @@
+"""The numbers of a run that an engineer asks for first, and what has to be known of them."""
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from quietbus.analysis.residual import residual, shows
+from quietbus.results.origin import rotors, scenario_of
+from quietbus.scenario import Scenario
+from quietbus.scenario.wheels import WheelCluster
+
+
+@dataclass(frozen=True)
+class Summary:
+    """The numbers of a run that an engineer asks for first."""
+
+    residual_rate: np.ndarray | None  # (3,) [rad/s] peak jitter per axis at the end of the run
+    residual_rate_rms: np.ndarray | None  # (3,) [rad/s]
+    slow_rate: np.ndarray | None  # (3,) [rad/s] peak of the slow motion in the same window
+    residual_note: str  # over which time, or why there is none
+    pointing_error: float  # [rad] largest norm of the attitude error in the last second
+    peak_gimbal_rate: float  # [rad/s]
+    peak_stroke: float  # [m]
+    peak_strut_force: float  # [N]
+    minimum_singularity: float  # [-]
+    rotor_speeds: np.ndarray | None  # (2,) [rad/s] least and largest, where speeds change
+    peak_rotor_torque: float | None  # [N m] likewise
+
+    def to_dict(self) -> dict[str, object]:
+        """Numbers and lists, for JSON."""
+        fields = dataclasses.asdict(self).items()
+        return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in fields}
+
+
+def summarize(run: xr.Dataset) -> Summary:
+    """The numbers of a run (see ``Summary``)."""
+    time = run["time"].to_numpy()
+    peak = lambda name: float(np.max(np.abs(run[name].to_numpy())))  # noqa: E731
+    error = np.linalg.norm(run["attitude_error"].to_numpy(), axis=1)
+    jitter = rms = slow = None
+    note = "not shown: the output rate is too low for the rotors"
+    if run.attrs["method"] == "harmonic":
+        last = time >= time[-1] - 1.0
+        jitter = run["bus_rate_jitter_envelope"].to_numpy()[last].max(axis=0)
+        rms = run["bus_rate_jitter_rms"].to_numpy()[last].max(axis=0)
+        slow = np.abs(run["bus_rate"].to_numpy()[last]).max(axis=0)
+        note = f"envelope from t = {time[last][0]:.4g} s to {time[-1]:.4g} s"
+        if "bus_rate_noise_rms" in run:
+            note += "; the rotors' noise is in the RMS alone"
+    elif not aliasing(scenario_of(run)):
+        try:
+            rest = residual(time, run["bus_rate"].to_numpy())
+            jitter, rms, slow = rest.jitter_peak, rest.jitter_rms, rest.slow
+            note = f"from t = {rest.window[0]:.4g} s to {rest.window[1]:.4g} s"
+        except ValueError as too_short:
+            note = str(too_short)
+    changing = "rotor_speed" in run
+    speed = run["rotor_speed"].to_numpy() if changing else np.zeros(1)
+    return Summary(
+        residual_rate=jitter,
+        residual_rate_rms=rms,
+        slow_rate=slow,
+        residual_note=note,
+        pointing_error=float(np.max(error[time >= time[-1] - 1.0])),
+        peak_gimbal_rate=peak("gimbal_rate"),
+        peak_stroke=peak("leg_stroke"),
+        peak_strut_force=peak("leg_force"),
+        minimum_singularity=float(run["singularity_measure"].min()),
+        rotor_speeds=np.array([speed.min(), speed.max()]) if changing else None,
+        peak_rotor_torque=peak("rotor_torque") if changing else None,
+    )
+
+
+def rotor_notes(run: xr.Dataset) -> list[str]:
+    """What the user has to know of rotors whose speed changed, in words.
+
+    Wheels at their limits, and speeds at which the output no longer shows the rotors' lines.
+    """
+    said: list[str] = []
+    if "rotor_speed" not in run:
+        return said
+    scenario, time = scenario_of(run), run["time"].to_numpy()
+    speeds = np.abs(run["rotor_speed"].to_numpy())
+    if run.attrs["method"] == "direct" and not aliasing(scenario):
+        said += filter(None, [aliasing(scenario, float(speeds.max()))])
+    cluster = scenario.cluster
+    if not isinstance(cluster, WheelCluster):
+        return said
+    for j, wheel in enumerate(cluster.placed()):
+        limit = wheel.motor and wheel.motor.speed_limit
+        reached = time[speeds[:, j] >= (1.0 - 1e-6) * (limit or np.inf)]
+        if reached.size and cluster.run_up is None:
+            said.append(
+                f"wheel {j} reached its speed limit of {limit:.5g} rad/s at t = "
+                f"{reached[0]:.4g} s: there it gives no torque that would take it further, and the "
+                "satellite does not feel all that the control asks for"
+            )
+    if "torque_share" in run:
+        share = run["torque_share"].to_numpy()
+        cut = time[share < 1.0]
+        if cut.size:
+            said.append(
+                f"the wheels' torque limit cut the torque to {100 * share.min():.3g} % of what was "
+                f"asked for at the least, first at t = {cut[0]:.4g} s, in "
+                f"{100 * cut.size / time.size:.3g} % of the outputs"
+            )
+    return said
+
+
+def aliasing(scenario: Scenario, speed: float = 0.0) -> str:
+    """Why the output rate cannot show the rotors' lines, or an empty text if it can.
+
+    Args:
+        speed: [rad/s] that a rotor has reached, if that is more than the scenario says.
+    """
+    speeds = [speed, *np.abs(rotors(scenario)[0])]
+    if scenario.cluster.run_up is not None:
+        speeds += np.abs(scenario.cluster.run_up.speeds(tuple(speeds[1:]))).ravel().tolist()
+    fastest = max(speeds) / (2.0 * np.pi)
+    rate = scenario.simulation.output_rate
+    if shows(rate, fastest):
+        return ""
+    return (
+        f"the output rate of {rate:g} Hz cannot show the rotors' {fastest:g} Hz: at least "
+        f"{2.56 * fastest:g} Hz is needed, {10 * fastest:g} Hz shows it well. The motion is "
+        "integrated with every turn resolved, but jitter in the output is aliased"
+    )
