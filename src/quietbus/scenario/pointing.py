@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import re
+from collections import Counter
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
@@ -20,7 +20,7 @@ from quietbus.scenario.base import (
     listing,
 )
 from quietbus.scenario.errors import Findings
-from quietbus.scenario.units import Quantity, expected
+from quietbus.scenario.units import Quantity, expected, whole_number
 
 COLUMNS = 12  # turn and displacement of the bus, then those of the plate relative to the bus
 
@@ -187,7 +187,6 @@ lines_of_sight:
   camera: {{direction: [0, 0, -1]}}
 requirements:
   - {EXAMPLE}"""
-_SHORT = re.compile(r"\s*(\w+)\s*\(\s*([^=,()]+?)\s*((?:,[^,=]+=[^,=]+)*)\)\s*(?:<=|≤)\s*(.+?)\s*")
 
 
 def _read(value: Any) -> Any:
@@ -195,14 +194,10 @@ def _read(value: Any) -> Any:
     if isinstance(value, Part):
         return value
     if isinstance(value, str):
-        short = _SHORT.fullmatch(value)
-        if short is None:
+        given = _short(value)
+        if given is None:
             raise expected(f"a mapping with the key metric, or a text like {EXAMPLE!r}", value)
-        options = [option.split("=") for option in short[3].split(",")[1:]]
-        given = [("metric", short[1]), ("line_of_sight", short[2]), ("at_most", short[4])]
-        given += [(key.strip(), _plain(text.strip())) for key, text in options]
-        keys = [key for key, _ in given]
-        twice = {key for key in keys if keys.count(key) > 1}
+        twice = [key for key, times in Counter(key for key, _ in given).items() if times > 1]
         if twice:
             raise expected(f"each key once, not {', '.join(sorted(twice))} twice", value)
         value = dict(given)
@@ -216,8 +211,25 @@ def _read(value: Any) -> Any:
     return value
 
 
+def _short(text: str) -> list[tuple[str, str | int]] | None:
+    """Keys and values of ``METRIC(line, key = value) <= limit``; None if it has not this form."""
+    call, _, limit = text.replace("≤", "<=").partition("<=")
+    metric, bracket, inside = call.strip().partition("(")
+    line, *options = inside.removesuffix(")").split(",")
+    given: list[tuple[str, str | int]] = [
+        ("metric", metric.strip()),
+        ("line_of_sight", line.strip()),
+        ("at_most", limit.strip()),
+    ]
+    for option in options:
+        key, _, value = option.partition("=")
+        given.append((key.strip(), _plain(value.strip())))
+    whole = bracket and inside.endswith(")") and all(key and value != "" for key, value in given)
+    return given if whole else None
+
+
 def _plain(text: str) -> str | int:
-    return int(text) if text.isdigit() else text
+    return int(text) if whole_number(text) else text
 
 
 def _form(value: Any) -> str:

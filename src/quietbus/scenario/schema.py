@@ -18,7 +18,7 @@ from quietbus.scenario.errors import Findings, Path, Problem, ScenarioError, dot
 from quietbus.scenario.hardware import Bus, Cluster, Isolator
 from quietbus.scenario.pointing import LinesOfSight, Requirements, unknown_lines
 from quietbus.scenario.text import read_yaml, write_yaml
-from quietbus.scenario.units import expected
+from quietbus.scenario.units import expected, whole_number
 from quietbus.scenario.wheels import AnyCluster, WheelCluster, cluster_type
 
 MOST_SAMPLES = 2e7  # of some 400 bytes each
@@ -78,7 +78,7 @@ def _yaml_text(data: str) -> str:
 def _keys(path: str) -> list[str | int]:
     """A dotted path as keys and indices."""
     parts = re.findall(r"[^.\[\]]+", path) or [""]
-    return [int(key) if key.isdigit() else key for key in parts]
+    return [int(key) if whole_number(key) else key for key in parts]
 
 
 def _without_nulls(data: Any) -> Any:

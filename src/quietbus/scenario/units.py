@@ -43,8 +43,10 @@ day = 24 * hour = d
 degree = 3.141592653589793 / 180 * radian = deg = °
 arcminute = degree / 60 = arcmin
 arcsecond = degree / 3600 = arcsec
+milliarcsecond = arcsecond / 1000 = mas
+microarcsecond = arcsecond / 1000000 = uas = µas
 turn = 6.283185307179586 * radian = rev = revolution = cycle
-revolutions_per_minute = turn / minute = rpm
+revolutions_per_minute = turn / minute = rpm = RPM
 revolutions_per_second = turn / second = rps
 hertz = 1 / second = Hz
 newton = kilogram * meter / second ** 2 = N
@@ -55,6 +57,8 @@ tonne = 1000 * kilogram = t
 inch = 0.0254 * meter = in
 foot = 0.3048 * meter = ft
 pound = 453.59237 * gram = lb
+ounce = pound / 16 = oz
+kilogram_force = 9.80665 * newton = kgf
 pound_force = 4.4482216152605 * newton = lbf
 ounce_force = pound_force / 16 = ozf
 slug = 14.593902937206364 * kilogram
@@ -85,11 +89,15 @@ _KNOWN = {
 
 Powers = dict[str, float]  # of the base dimensions: {"[length]": 1, "[time]": -1}
 
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_QUANTITY = re.compile(rf"\s*({_NUMBER})\s*\*?\s*(.*?)\s*", re.DOTALL)
+# Texts come from anywhere: no part of a pattern is tried again ("++", "*+"), so that the time is
+# linear in the length of the text.
+_NUMBER = re.compile(r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][+-]?\d++)?")
 # Names, their powers of one digit, and what joins them: pint would try to compute 9^9^9^9.
-_POWER = r"(?:\^|\*\*)\s*\(?\s*[+-]?\d(?:\.\d)?(?!\s*(?:\d|\^|\*\*))"
-_UNIT = re.compile(rf"(?:[^\W\d]+|[°%²³]|{_POWER}|1(?=\s*/)|[*/·()\s])*")
+_POWER = r"(?:\^|\*\*)\s*+\(?\s*+[+-]?\d(?:\.\d)?(?!\s*+(?:\d|\^|\*\*))"
+_UNIT = re.compile(rf"(?:[^\W\d]++|[°%²³]|{_POWER}|1(?=\s*+/)|[*/·()\s])*+")
+_LONGEST_UNIT = 60
+_DASH = re.compile(r"(?<=[^\W\d])-(?=[^\W\d])|(?<=\^\d)-(?=[^\W\d])")
+_RUN_TOGETHER = re.compile(r"(?:kg|[kmM]?N|[cm]?m|ozf?|lbf?|in|ft|rad|g|s)++", re.IGNORECASE)
 
 
 @functools.cache
@@ -105,8 +113,8 @@ def _unit(text: str) -> tuple[float, Powers]:
     """SI factor and powers of the base dimensions of a unit; ValueError says why it is none."""
     import pint
 
-    if len(text) > 60 or not _UNIT.fullmatch(text):
-        raise ValueError(f"{shown(text)} is not a unit")
+    if len(text) > _LONGEST_UNIT or not _UNIT.fullmatch(text):
+        raise ValueError(f"{shown(text)} is not a unit{_meant_unit(text)}")
     try:
         units = registry().parse_units(text.replace("·", "*"))
         factor, base = cast("tuple[float, Any]", registry().get_root_units(units))
@@ -121,16 +129,54 @@ def _unit(text: str) -> tuple[float, Powers]:
         raise ValueError(f"{shown(text)} is not a unit") from None
 
 
-def _similar_unit(name: str) -> str:
-    if re.fullmatch(r"[kM]?Nm?m?s?", name):
+def _meant_unit(text: str) -> str:
+    """What a text that is no unit was meant for."""
+    if text.startswith(",") and text[1:2].isdecimal():
+        return "; numbers have a decimal point"
+    product = _DASH.sub("*", text)
+    if product == text or len(text) > _LONGEST_UNIT:
+        return ""
+    try:
+        _unit(product)
+    except ValueError:
         return "; products are written with *, as in N*m"
-    known = [alias for line in DEFINITIONS.split("\n") for alias in re.findall(r"[^\W\d]+", line)]
-    close = difflib.get_close_matches(name, known, n=1)
+    return f"; products are written with *: {product}"
+
+
+def _similar_unit(name: str) -> str:
+    same = sorted(known for known in _symbols() if known.lower() == name.lower())
+    if same:
+        return f"; did you mean '{same[0]}'? units mind capitals"
+    if _RUN_TOGETHER.fullmatch(name):
+        return "; products are written with *, as in N*m"
+    close = difflib.get_close_matches(name, _symbols(), n=1)
     return f"; did you mean '{close[0]}'?" if close else ""
+
+
+@functools.cache
+def _symbols() -> tuple[str, ...]:
+    """Names of units, and the usual ones behind their prefixes.
+
+    Not the nanometre: NM and Nm are meant for a product.
+    """
+    lines = [[name.strip() for name in line.split("=")] for line in DEFINITIONS.strip().split("\n")]
+    names = [
+        alias
+        for first, _, *others in lines
+        for alias in (first, *others)
+        if not first.endswith("-") and alias.isidentifier()
+    ]
+    short = ("m", "g", "s", "N", "Hz", "Pa", "W", "J", "rad", "lbf")
+    return tuple(names + [prefix + unit for prefix in ("n", "u", "m", "c", "k", "M", "G")
+                          for unit in short if (prefix, unit) != ("n", "m")])  # fmt: skip
 
 
 def _without_angle(powers: Powers) -> Powers:
     return {name: power for name, power in powers.items() if name != "[angle]"}
+
+
+def _nonzero(powers: Powers) -> Powers:
+    return {name: power for name, power in powers.items() if power}
 
 
 @dataclass(frozen=True)
@@ -181,10 +227,13 @@ class Quantity:
             return math.inf
 
     def _from_text(self, text: str) -> float:
-        match = _QUANTITY.fullmatch(text)
+        stripped = text.strip()
+        match = _NUMBER.match(stripped)
         if match is None:
             raise self._error(text)
-        number, unit = float(match[1]), match[2]
+        number, unit = float(match[0]), stripped[match.end() :].strip()
+        if unit.startswith("*") and not unit.startswith("**"):
+            unit = unit[1:].strip()
         if not unit:
             return number
         try:
@@ -203,6 +252,9 @@ class Quantity:
     def _guess(self, expected: Powers, powers: Powers) -> str:
         """What a quantity of the wrong dimension may have been."""
         names = [name for name, unit in _KNOWN.items() if _unit(unit)[1] == powers]
+        forced = {name: powers.get(name, 0) + power for name, power in _unit("m/s^2")[1].items()}
+        if _nonzero(powers | forced) == _nonzero(_without_angle(expected)):
+            return "a mass where a force belongs? write N, kgf, lbf or ozf"
         if "[angle]" in expected and _without_angle(expected) == powers:
             units = "rpm, rev/s, deg/s or rad/s" if self.unit == "rad/s" else self.unit
             return f"turns or radians? write {units}"
@@ -214,6 +266,11 @@ class Quantity:
         # a name may end in a comma, for the unit to follow
         what = f"{self.name} in {self.unit}" if self.unit else self.name.removesuffix(",")
         return expected(what, value, why)
+
+
+def whole_number(text: str) -> bool:
+    """Whether a text is a number that int() reads: digits, not superscripts, nor thousands."""
+    return text.isdecimal() and len(text) < 19
 
 
 def expected(what: str, value: Any, why: str = "") -> PydanticCustomError:
