@@ -239,6 +239,20 @@ def test_less_than_three_legs():
     )
 
 
+@pytest.mark.parametrize("count", [3, 4, 5])
+def test_fewer_than_six_struts_leave_a_direction_free(count):
+    """Each strut is one line of force: six directions take six of them, wherever they stand."""
+    rng = np.random.default_rng(count)
+    for _ in range(20):
+        lower, upper = rng.uniform(-1.0, 1.0, (2, count, 3))
+        s = (upper - lower) / np.linalg.norm(upper - lower, axis=1, keepdims=True)
+        wrenches = np.hstack([s, np.cross(upper, s)])  # of unit forces along the legs
+        assert np.linalg.matrix_rank(wrenches) < 6
+    message = problem(isolator__legs=legs_with(CUBIC_LOWER[:count], CUBIC_UPPER[:count]))
+    assert f"these {count} leave free: " in message
+    assert "a strut resists along its own line alone, so it takes six" in message
+
+
 def test_leg_lists_must_be_of_one_length():
     legs = DATA["isolator"]["legs"] | {"lower_joints": CUBIC_LOWER[:5].tolist()}
     assert (

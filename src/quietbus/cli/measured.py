@@ -18,8 +18,12 @@ from quietbus.cli.written import write_study
 
 @app.command("import")
 def import_(
-    file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="CSV, S2E's .ini or .csv, 42's Whl_*.txt.")
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILE...",
+            help="CSV, S2E's .ini or .csv, 42's Whl_*.txt; several CSV files of one wheel.",
+        ),
     ],
     output: Annotated[
         Path | None,
@@ -28,6 +32,9 @@ def import_(
     kind: Annotated[
         str | None, typer.Option(help="radial_force, ...; where the file does not say it.")
     ] = None,
+    wheel: Annotated[
+        str | None, typer.Option(help="Section of S2E's .ini, where its wheels differ.")
+    ] = None,
 ) -> None:
     """A harmonic table of a rotor as the scenario's block `disturbance`."""
     from quietbus.scenario import read_wheel_table
@@ -35,7 +42,9 @@ def import_(
 
     if kind is not None and kind not in KINDS:
         raise BadInput(f"--kind: expected one of {', '.join(KINDS)}, got '{kind}'")
-    table = read_wheel_table(file, kind)
+    if kind is not None and len(files) > 1:
+        raise BadInput("--kind: expected one file with it, whose kind it says")
+    table = read_wheel_table(files, kind, wheel)
     for lost in table.lost:
         print(f"note: not taken over: {lost}", file=sys.stderr)
     for note in table.notes:

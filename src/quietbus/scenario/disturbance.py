@@ -196,23 +196,25 @@ class Disturbance(Part):
     @model_validator(mode="before")
     @classmethod
     def _read_table(cls, data: Any, info: ValidationInfo) -> Any:
-        """Put the orders and resonances of the file in the place of its name.
+        """Put the orders and resonances of the file, or of several, in the place of the name.
 
         A relative path starts at the folder of the scenario's file.
         """
         if not isinstance(data, dict) or data.get("table") is None:
             return data
         findings = Findings()
-        name = data["table"]
-        if not isinstance(name, str) or not name:
-            findings.add("table", expected("the name of a file", name).message())
+        given = data["table"]
+        names = given if isinstance(given, list) else [given]
+        if not names or not all(isinstance(name, str) and name for name in names):
+            what = "the name of a file, or a list of names"
+            findings.add("table", expected(what, given).message())
             findings.raise_any()
         if data.get("orders") is not None:
             findings.add("table", "expected either table or orders, got both")
         findings.raise_any()
         folder = Path((info.context or {}).get("folder", "."))
         try:
-            table = read_wheel_table(folder / name)
+            table = read_wheel_table([folder / name for name in names])
         except ScenarioError as error:
             for problem in error.problems:
                 findings.add("table", f"{error.source}: {problem}")

@@ -160,10 +160,11 @@ class Isolator(Part):
                     )
         free = free_directions(lower, upper)
         if free and not repeated:  # a repeated leg is the likely cause, and is told
+            few = "; a strut resists along its own line alone, so it takes six" * (len(lower) < 6)
             findings.add(
                 ("legs",),
                 f"expected legs that hold the plate in all six directions; these {len(lower)} "
-                f"leave free: {'; '.join(free)} (base-plate frame)",
+                f"leave free: {'; '.join(free)} (base-plate frame){few}",
             )
         findings.raise_any()
         return self
