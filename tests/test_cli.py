@@ -11,6 +11,7 @@ import pytest
 
 import quietbus as qb
 from quietbus import cli
+from quietbus.writing import OutputError
 
 
 @pytest.fixture
@@ -171,7 +172,7 @@ def test_run_that_cannot_be_written_is_kept_elsewhere(command, tmp_path, monkeyp
     def full_disk(run, path):
         if not refused:
             refused.append(path)
-            raise OSError(28, "No space left on device")
+            raise OutputError(f"{path}: cannot be written: No space left on device")
         write(run, path)
 
     monkeypatch.setattr(results, "save_run", full_disk)

@@ -162,10 +162,10 @@ def test_plotly_is_embedded_once_and_nothing_is_linked():
 
 
 def test_a_page_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch):
-    (tmp_path / "run.html").write_text("old")
+    (tmp_path / "run.html").write_text("<!DOCTYPE html> old")
     write_report(synthetic(count=10), tmp_path / "run.html")
     assert [path.name for path in tmp_path.iterdir()] == ["run.html"]
-    assert (tmp_path / "run.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    assert "CMGs" in (tmp_path / "run.html").read_text(encoding="utf-8")
     with pytest.raises(OSError, match="folder"):
         write_report(synthetic(count=10), tmp_path / "folder" / "run.html")
 

@@ -93,7 +93,7 @@ def test_what_is_not_whole_or_of_other_sources_is_made_again(small, tmp_path, ha
         numbers.write_text(numbers.read_text()[:40])
     else:
         numbers.write_text(numbers.read_text().replace('"key": "', '"key": "old'))
-    (tmp_path / ".made" / "two.png.part").write_text("left behind")
+    (tmp_path / ".made" / ".quietbus-0123.part").write_text("left behind")
     assert reproduce(small.paper, tmp_path).made == ("two",)
     assert not list(tmp_path.rglob("*.part"))
 

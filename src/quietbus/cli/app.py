@@ -10,8 +10,9 @@ import typer
 from typer.core import TyperGroup
 
 from quietbus.cli.given import Asked
-from quietbus.cli.guard import BAD_INPUT, BadInput
+from quietbus.cli.guard import BAD_INPUT, FAILED, BadInput
 from quietbus.cli.session import on_interrupt
+from quietbus.writing import OutputError
 
 ORDER = [
     *("init", "simulate", "compare", "plot", "report", "analyze", "jitter", "verify"),
@@ -41,6 +42,9 @@ def main() -> None:
     signal.signal(signal.SIGINT, on_interrupt)
     try:
         app()
+    except OutputError as error:  # a disk that has become full, or the like
+        print(f"quietbus: {error}", file=sys.stderr)
+        sys.exit(FAILED)
     except Exception as error:
         from quietbus.scenario import ScenarioError  # here, so that --help need not load it
 

@@ -9,6 +9,8 @@ from typing import NoReturn
 
 import typer
 
+from quietbus.writing import OutputError, check_target
+
 BAD_INPUT, FAILED = 2, 1
 
 
@@ -21,32 +23,34 @@ def fail(message: str) -> NoReturn:
     raise typer.Exit(FAILED)
 
 
-def check_folder(folder: Path) -> None:
-    if not folder.is_dir():
-        raise BadInput(f"{folder}: no such folder")
+def check_file(file: Path, kind: str) -> None:
+    """Refuse a file that cannot be written, before anything is computed for it.
+
+    Args:
+        kind: of ``quietbus.writing.BEGINNINGS``.
+    """
+    try:
+        check_target(file, kind)
+    except OutputError as error:
+        raise BadInput(str(error)) from None
 
 
-def check_file(file: Path) -> None:
-    """Refuse a file that cannot be written, before anything is computed for it."""
-    check_folder(file.parent)
-    if file.is_dir():
-        raise BadInput(f"{file}: is a folder; expected the name of a file")
-    _check_writable(file.parent, file)
+def make_folder(folder: Path, *numbers: str) -> None:
+    """Make a folder for results, and refuse it where the files of their numbers have no place.
 
-
-def make_folder(folder: Path) -> None:
+    Args:
+        numbers: names of files that are to be written there, JSON.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except FileExistsError:
         raise BadInput(f"{folder}: is a file; expected the name of a folder") from None
     except OSError as error:
         raise BadInput(f"{folder}: cannot be made: {error.strerror}") from None
-    _check_writable(folder, folder)
-
-
-def _check_writable(folder: Path, wanted: Path) -> None:
     try:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        raise BadInput(f"{wanted}: cannot be written: {error.strerror or error}") from None
+        raise BadInput(f"{folder}: cannot be written: {error.strerror or error}") from None
+    for name in numbers:
+        check_file(folder / name, "JSON file")

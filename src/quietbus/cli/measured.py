@@ -14,6 +14,9 @@ from quietbus.cli.given import OUT, FolderOption, JsonOption
 from quietbus.cli.guard import BadInput, check_file, make_folder
 from quietbus.cli.session import print_table, status
 from quietbus.cli.written import write_study
+from quietbus.writing import write_text
+
+BLOCK = "disturbance block (YAML)"
 
 
 @app.command("import")
@@ -42,6 +45,8 @@ def import_(
 
     if kind is not None and kind not in KINDS:
         raise BadInput(f"--kind: expected one of {', '.join(KINDS)}, got '{kind}'")
+    if output is not None:
+        check_file(output, BLOCK)
     if kind is not None and len(files) > 1:
         raise BadInput("--kind: expected one file with it, whose kind it says")
     table = read_wheel_table(files, kind, wheel)
@@ -56,8 +61,7 @@ def _write_block(text: str, output: Path | None) -> None:
     if output is None:
         print(text, end="")
         return
-    check_file(output)
-    output.write_text(text, encoding="utf-8")
+    write_text(output, text, BLOCK)
     print(f"wrote {output}")
 
 
@@ -75,7 +79,8 @@ def fit(
     from quietbus.measured import fit_waterfall
 
     if not as_json:
-        make_folder(output)
+        make_folder(output, "fit.json")
+        check_file(output / "disturbance.yaml", BLOCK)
     try:
         with status() as tell:
             tell("fitting")
@@ -90,5 +95,5 @@ def fit(
 
     for table in fit_tables(fitted):
         print_table(table)
-    (output / "disturbance.yaml").write_text(fitted.to_yaml(), encoding="utf-8")
+    write_text(output / "disturbance.yaml", fitted.to_yaml(), BLOCK)
     write_study("fit", fitted.to_dict(), lambda: waterfall_figures(fitted), output)

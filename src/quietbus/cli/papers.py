@@ -28,7 +28,7 @@ def reproduce(
 
     if paper not in PAPERS:
         raise BadInput(f"unknown paper '{paper}'; known: {', '.join(PAPERS)}")
-    make_folder(output)
+    make_folder(output, "table.json")
     import_heavy()
     from quietbus.reproduce import load_paper
     from quietbus.reproduce.pages import verdicts_table

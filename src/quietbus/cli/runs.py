@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 from typing import Annotated
@@ -30,6 +29,10 @@ from quietbus.cli.session import (
     progress,
 )
 from quietbus.cli.written import save
+from quietbus.writing import write_json
+
+RUN = "run (NetCDF-4)"
+LONGEST = 100  # letters of a scenario's name in the name of a file
 
 
 @app.command()
@@ -54,20 +57,20 @@ def simulate(
 ) -> None:
     """Simulate a scenario; write the run and print what one wants to know of it."""
     checked = load(scenario, mount, duration, output_rate)
+    chosen = checked.isolator.mount
+    name = f"{re.sub(r'[^A-Za-z0-9._-]+', '-', checked.name)[:LONGEST]}-{chosen}"
+    output = output or Path(f"{name}-harmonic.nc" if method == Method.harmonic else f"{name}.nc")
+    check_file(output, RUN)
+    if joint_forces and method == Method.harmonic:
+        raise BadInput("--joint-forces needs --method direct")
+    if joint_forces and chosen == Mount.rigid:
+        raise BadInput("--joint-forces needs the isolated mount: a rigid one leaves them open")
     import_heavy()
     from quietbus import api
     from quietbus.results import summarize
     from quietbus.solve.harmonic import ResonanceError
     from quietbus.tables import summary_table
 
-    chosen = checked.isolator.mount
-    name = f"{re.sub(r'[^A-Za-z0-9._-]+', '-', checked.name)}-{chosen}"
-    output = output or Path(f"{name}-harmonic.nc" if method == Method.harmonic else f"{name}.nc")
-    check_file(output)
-    if joint_forces and method == Method.harmonic:
-        raise BadInput("--joint-forces needs --method direct")
-    if joint_forces and chosen == Mount.rigid:
-        raise BadInput("--joint-forces needs the isolated mount: a rigid one leaves them open")
     failed = ""
     with keeping_results():
         with progress({chosen: checked.simulation.duration}) as tell, notes():
@@ -104,7 +107,9 @@ def compare(
 ) -> None:
     """Simulate with the isolator and without, side by side, with pictures."""
     checked = load(scenario, None, duration)
-    make_folder(output)
+    make_folder(output, "summary.json")
+    for each in Mount:
+        check_file(output / f"{each}.nc", RUN)
     import_heavy()
     from quietbus import api
     from quietbus.plots import compare_figures, run_figures, save_figures
@@ -125,7 +130,7 @@ def compare(
         summaries = {str(mount): summarize(run) for mount, run in runs.items()}
         print_table(summary_table(summaries))
         numbers = {mount: summary.to_dict() for mount, summary in summaries.items()}
-        (output / "summary.json").write_text(json.dumps(numbers, indent=2) + "\n")
+        write_json(output / "summary.json", numbers)
         figures = compare_figures(runs) | {
             f"{mount}-{name}": figure
             for mount, run in runs.items()
@@ -183,18 +188,15 @@ def report(
         raise BadInput(str(error)) from None
     scenario = scenario_of(loaded)
     page = output or run.with_suffix(".html")
-    check_file(page)
     if page.resolve() == run.resolve():
         raise BadInput(f"{page}: is the run itself; expected another name for the page")
+    check_file(page, "page (HTML)")
     try:
         from quietbus.report import write_report
 
         checks = checks_of(scenario, None) if check else None
     except ImportError as error:
         fail(str(error))
-    try:
-        write_report(loaded, page, checks)
-    except OSError as error:
-        fail(f"{page}: cannot be written: {error.strerror or error}")
+    write_report(loaded, page, checks)
     print(f"wrote {page}")
     fail_unless_passed(checks or [])

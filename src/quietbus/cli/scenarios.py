@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,8 +11,9 @@ import typer
 
 from quietbus.cli.app import app
 from quietbus.cli.given import Mount, ScenarioArgument, load
-from quietbus.cli.guard import BadInput, check_file, check_folder, fail
+from quietbus.cli.guard import BadInput, check_file, fail
 from quietbus.cli.session import import_heavy, print_table, status
+from quietbus.writing import write_text
 
 if TYPE_CHECKING:
     from quietbus.scenario import Scenario
@@ -25,14 +27,10 @@ def init(
     """Write a commented scenario to start from."""
     from quietbus.scenario import template_text
 
-    check_folder(file.parent)
-    try:
-        with file.open("x", encoding="utf-8") as new:
-            new.write(template_text())
-    except FileExistsError:
-        raise BadInput(f"{file}: exists already; choose another name") from None
-    except OSError as error:
-        raise BadInput(f"{file}: cannot be written: {error.strerror}") from None
+    if os.path.lexists(file):
+        raise BadInput(f"{file}: exists already; choose another name")
+    check_file(file, "new scenario (YAML)")
+    write_text(file, template_text(), "new scenario (YAML)")
     print(f"wrote {file}; next: quietbus compare {file}")
 
 
@@ -47,7 +45,7 @@ def validate(
     """Check a scenario against an independent engine (MuJoCo) and conservation laws."""
     checked = load(scenario, mount, None)
     if export is not None:
-        check_file(export)
+        check_file(export, "MuJoCo model (XML)")
     from quietbus.tables import checks_table
 
     try:
@@ -68,7 +66,7 @@ def checks_of(scenario: Scenario, export: Path | None) -> list[Check]:
     satellite = build_satellite(scenario)
     state = build_initial_state(scenario, satellite)
     if export is not None:
-        export.write_text(checking.write_mjcf(satellite, state), encoding="utf-8")
+        write_text(export, checking.write_mjcf(satellite, state), "MuJoCo model (XML)")
         print(f"wrote {export}")
     if satellite.disturbance is not None or satellite.motor is not None:
         print("checked without the rotors' disturbances and the gimbal motors' ripple")

@@ -42,7 +42,7 @@ def analyze(
     """Modes, isolator channels, gain range and margins: per axis and of the whole satellite."""
     checked = at_angles(load(scenario, None, None), gimbal_angles)
     if not as_json:
-        make_folder(output)
+        make_folder(output, "analysis.json")
     import_heavy()
     from quietbus import api
     from quietbus.dynamics.linearize import OperatingPointError
@@ -81,7 +81,7 @@ def jitter(
     checked = at_angles(load(scenario, None, None), gimbal_angles)
     most = None if max_speed is None else speed(max_speed)
     if not as_json:
-        make_folder(output)
+        make_folder(output, "jitter.json")
     import_heavy()
     from quietbus import api
 
@@ -130,7 +130,7 @@ def verify(
 
         raise BadInput(f"{scenario}: requirements: {NO_REQUIREMENTS}")
     if not as_json:
-        make_folder(output)
+        make_folder(output, "verification.json")
     import_heavy()
     from quietbus import api
     from quietbus.solve.harmonic import ResonanceError

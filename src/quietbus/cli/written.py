@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from quietbus.cli.session import status
+from quietbus.writing import OutputError, write_json
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def save(run: xr.Dataset, output: Path) -> list[str]:
-    """Write a run; where that fails, to the folder for temporary files, so that it is not lost.
+    """Write a run; where that fails, elsewhere under a safe name, so that it is not lost.
 
     What went wrong, for the user, or nothing.
     """
@@ -24,10 +24,16 @@ def save(run: xr.Dataset, output: Path) -> list[str]:
 
     try:
         save_run(run, output)
-    except OSError as error:
-        refuge = Path(tempfile.mkdtemp(prefix="quietbus-")) / output.name
-        save_run(run, refuge)
-        return [f"{output}: cannot be written: {error.strerror or error}; the run is in {refuge}"]
+    except (OSError, ValueError) as error:
+        told = str(error) if isinstance(error, OutputError) else f"{output}: {error}"
+        for folder in (tempfile.gettempdir(), Path.cwd(), Path.home()):
+            try:
+                refuge = Path(tempfile.mkdtemp(prefix="quietbus-", dir=folder))
+                save_run(run, refuge / "run.nc")
+            except (OSError, ValueError):
+                continue
+            return [f"{told}; the run is in {refuge / 'run.nc'}"]
+        return [f"{told}; nor is there any other place for the run"]
     print(f"wrote {output}")
     return []
 
@@ -42,5 +48,5 @@ def write_study(
         tell("drawing")
         figures = draw()
         save_figures(figures, output)
-    (output / f"{name}.json").write_text(json.dumps(numbers, indent=2) + "\n")
+    write_json(output / f"{name}.json", numbers)
     print(f"wrote {name}.json and {len(figures)} pictures to {output}/")

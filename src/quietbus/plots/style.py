@@ -11,6 +11,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from quietbus.writing import replacing
+
 # Okabe and Ito's colours, told apart by colour-blind readers too, without the pale yellow
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 DASHES = ("-", (0, (5, 1.5)), (0, (6, 1.5, 1, 1.5)), (0, (1.5, 1)))  # told apart in black and white
@@ -55,12 +57,20 @@ def new_figure(height: float, title: str) -> Figure:
 def save_figures(
     figures: dict[str, Figure], directory: str | pathlib.Path, suffix: str = ".png"
 ) -> list[pathlib.Path]:
-    """Write figures as ``directory/name.suffix``: PNG at 150 dpi, or SVG or PDF."""
+    """Write figures as ``directory/name.suffix``: PNG at 150 dpi, or SVG or PDF.
+
+    Raises:
+        ValueError: another suffix.
+        OutputError: (an OSError) a picture cannot be written.
+    """
+    if suffix not in (".png", ".svg", ".pdf"):
+        raise ValueError(f"suffix must be .png, .svg or .pdf; got {suffix!r}")
     folder = pathlib.Path(directory)
     folder.mkdir(parents=True, exist_ok=True)
     paths = [folder / f"{name}{suffix}" for name in figures]
     for path, figure in zip(paths, figures.values(), strict=True):
-        figure.savefig(path)
+        with replacing(path, f"{suffix} picture") as file:
+            figure.savefig(file, format=suffix[1:])
     return paths
 
 

@@ -4,7 +4,6 @@ import datetime
 import importlib.metadata
 import importlib.resources
 import os
-import pathlib
 import platform
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -27,6 +26,7 @@ except ModuleNotFoundError as missing:
     ) from missing
 from quietbus.results import aliasing, has_gimbals, scenario_of, summarize
 from quietbus.tables import checks_table, summary_table
+from quietbus.writing import check_target, write_text
 
 if TYPE_CHECKING:
     from quietbus.validate import Check
@@ -95,15 +95,13 @@ def report_page(run: xr.Dataset, checks: "Sequence[Check] | None" = None) -> str
 def write_report(
     run: xr.Dataset, path: str | os.PathLike[str], checks: "Sequence[Check] | None" = None
 ) -> None:
-    """Write ``report_page``; an old file of that name is replaced once the new one is whole."""
-    path = pathlib.Path(path)
-    page = report_page(run, checks)
-    partial = path.with_name(f".{path.name}.part")
-    try:
-        partial.write_text(page, encoding="utf-8")
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
+    """Write ``report_page``; an older page of that name is replaced once the new one is whole.
+
+    Raises:
+        OutputError: (an OSError) the page cannot be written, or is no page and so not replaced.
+    """
+    check_target(path, "page (HTML)")
+    write_text(path, report_page(run, checks), "page (HTML)")
 
 
 def _embedded(picture: Picture) -> dict[str, str]:

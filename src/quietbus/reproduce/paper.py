@@ -14,9 +14,10 @@ from typing import Any
 from matplotlib.figure import Figure
 
 import quietbus
-from quietbus.plots.style import style
+from quietbus.plots.style import save_figures, style
 from quietbus.reproduce.claims import Claim
 from quietbus.reproduce.pages import report_page, table_page
+from quietbus.writing import UNFINISHED, write_json, write_text
 
 Tell = Callable[[str, float], None]  # what is being done, and how far it is, 0 to 1
 NOT_COMPUTED_WITH = ("cli", "tables.py", "report")  # sources that no number depends on
@@ -89,7 +90,7 @@ class Workshop:
         self.key = fingerprint()
         self.store = folder / ".made"
         self.store.mkdir(parents=True, exist_ok=True)
-        for left in self.store.glob("*.part"):
+        for left in (*folder.glob(UNFINISHED), *self.store.glob(UNFINISHED)):
             left.unlink()
 
     def kept(self, part: Part) -> Made | None:
@@ -112,20 +113,12 @@ class Workshop:
         if odd:
             raise ValueError(f"expected finite numbers, got others for {', '.join(odd)}")
         file = f"{part.name}.png"
-        unfinished = self.store / f"{file}.part"
         with style():
-            found.figure.savefig(unfinished, format="png")
-        picture = unfinished.read_bytes()
-        unfinished.replace(self.folder / file)
+            save_figures({part.name: found.figure}, self.folder)
+        picture = (self.folder / file).read_bytes()
         made = Made(self.key, file, _hash(picture), found.caption, found.text, numbers)
-        self.write(self.store / f"{part.name}.json", json.dumps(asdict(made), indent=1))
+        write_json(self.store / f"{part.name}.json", asdict(made))
         return made
-
-    def write(self, path: pathlib.Path, text: str) -> None:
-        """Write a text whole or not at all."""
-        unfinished = self.store / f"{path.name}.part"
-        unfinished.write_text(text, "utf-8")
-        os.replace(unfinished, path)
 
 
 def reproduce(
@@ -169,17 +162,17 @@ def reproduce(
                 new.append(part.name)
             except Exception as error:  # any failure of one part must leave the others alone
                 failed[part.name] = f"{type(error).__name__}: {error}"
-                shop.write(shop.store / f"{part.name}.log", traceback.format_exc())
+                write_text(shop.store / f"{part.name}.log", traceback.format_exc(), "log")
     except KeyboardInterrupt:
         interrupted = True
     table = _table(paper, done, failed, shop.key)
-    shop.write(shop.folder / "table.json", json.dumps(table, indent=2, allow_nan=False) + "\n")
-    shop.write(shop.folder / "table.md", table_page(table))
+    write_json(shop.folder / "table.json", table)
+    write_text(shop.folder / "table.md", table_page(table), "Markdown file")
     chapters = {
         heading: [(part.title, done.get(part.name), part.name) for part in parts]
         for heading, parts in paper.chapters.items()
     }
-    shop.write(shop.folder / "report.md", report_page(table, chapters))
+    write_text(shop.folder / "report.md", report_page(table, chapters), "Markdown file")
     kept_names = tuple(name for name in done if name not in new)
     return Outcome(table, tuple(new), kept_names, failed, interrupted)
 

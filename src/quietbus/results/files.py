@@ -1,23 +1,107 @@
 """Files of runs: written, read and checked."""
 
+import contextlib
+import io
 import os
 import pathlib
 import warnings
+from collections.abc import Iterator
+from typing import Any
 
+import h5netcdf
 import xarray as xr
 
 from quietbus.results.schema import VARIABLES
+from quietbus.writing import replacing
 
 
 def save_run(run: xr.Dataset, path: str | os.PathLike[str]) -> None:
-    """Write a run as NetCDF-4; an old file of that name is replaced once the new one is whole."""
-    path = pathlib.Path(path)
-    partial = path.with_name(f".{path.name}.part")
-    try:
-        run.to_netcdf(partial, engine="h5netcdf")
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
+    """Write a run as NetCDF-4; an older run of that name is replaced once the new one is whole.
+
+    Raises:
+        OutputError: (an OSError) the file cannot be written, or is no run and so not replaced.
+    """
+    with replacing(path, "run (NetCDF-4)") as file:
+        disk = _Disk(file.raw)
+        with h5netcdf.File(disk, "w") as stored:
+            run.dump_to_store(xr.backends.H5NetCDFStore(stored))
+        if disk.refused is not None:
+            raise disk.refused
+
+
+class _Disk(io.RawIOBase):
+    """A file for HDF5 to write to, which ends in a segmentation fault where a write fails.
+
+    Here none does: the first refusal is kept, and what comes after it goes into memory, where HDF5
+    finds it again, until the file is closed and given up.
+    """
+
+    def __init__(self, file: io.RawIOBase):
+        self.file, self.refused = file, None
+        self.position = self.size = 0
+        self.unwritten: list[tuple[int, bytes]] = []
+
+    refused: OSError | None
+
+    def readable(self) -> bool:
+        return True
+
+    def writable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def tell(self) -> int:
+        return self.position
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        start = {os.SEEK_SET: 0, os.SEEK_CUR: self.position, os.SEEK_END: self.size}[whence]
+        self.position = start + offset
+        return self.position
+
+    def readinto(self, buffer: Any) -> int:
+        start, end = self.position, min(self.position + len(buffer), self.size)
+        found = bytearray(max(end - start, 0))
+        with self._noted():
+            self.file.seek(start)
+            self.file.readinto(found)
+        for at, data in self.unwritten:
+            low, high = max(at, start), min(at + len(data), end)
+            if low < high:
+                found[low - start : high - start] = data[low - at : high - at]
+        buffer[: len(found)] = found
+        self.position += len(found)
+        return len(found)
+
+    def write(self, data: Any) -> int:
+        data, start = memoryview(data).cast("B"), self.position
+        self.position += len(data)
+        self.size = max(self.size, self.position)
+        if self.refused is None:
+            with self._noted():
+                self._put(start, data)
+        if self.refused is not None:
+            self.unwritten.append((start, bytes(data)))
+        return len(data)
+
+    def truncate(self, size: int | None = None) -> int:
+        self.size = self.position if size is None else size
+        with self._noted():
+            self.file.truncate(self.size)
+        return self.size
+
+    def _put(self, start: int, data: memoryview) -> None:
+        self.file.seek(start)
+        while data:
+            data = data[self.file.write(data) :]
+
+    @contextlib.contextmanager
+    def _noted(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            self.refused = self.refused or error
 
 
 def load_run(path: str | os.PathLike[str]) -> xr.Dataset:
