@@ -11,6 +11,7 @@ import pytest
 
 import quietbus as qb
 from quietbus import cli
+from quietbus.tables import critical_table
 from quietbus.writing import OutputError
 
 
@@ -196,6 +197,24 @@ def test_coarse_output_is_told(command, tmp_path):
     assert status == 0
     assert "note: the output rate of 50 Hz cannot show" in err
     assert "n/a" in out
+
+
+def test_version_is_the_packages(command):
+    assert command("--version") == (0, f"quietbus {qb.__version__}\n", "")
+
+
+def test_a_mode_has_one_name_in_all_tables():
+    """That of `analyze`, which JSON has too, in the table of critical speeds of `jitter`."""
+    found = {
+        "factor": 0.5, "speed_rpm": 3000.0, "order": 1.0, "frequency_hz": 50.0, "damping": 0.1,
+        "amplification": 5.0, "bus_rate_amplitude_deg_s": [1e-5, 0.0, 0.0], "excited": True,
+        "mode": "translation x + rotation y",
+    }  # fmt: skip
+    sweep = {
+        "speed_rpm": [0.0, 6000.0],
+        "isolated": {"critical_speeds": [found], "bearing_critical_speeds": []},
+    }
+    assert list(critical_table(sweep, "").columns[-1].cells) == ["translation x + rotation y"]
 
 
 def test_help_and_import_do_not_load_heavy_modules():

@@ -369,7 +369,7 @@ def critical_table(sweep: Mapping[str, Any], held: str) -> Table:
             f"{critical['damping']:.3f}",
             _number(critical["amplification"]),
             f"{math.hypot(*critical['bus_rate_amplitude_deg_s']):.2e}",
-            critical["mode"].replace("translation", "along").replace("rotation", "about"),
+            critical["mode"],
         )
     table.caption = "bus rate: norm of the sums of the rotors' amplitudes" if shown else "none"
     if len(shown) < len(found):

@@ -11,7 +11,15 @@ from matplotlib.figure import Figure
 
 from quietbus.plots import compare_figures, run_figures, save_figures
 from quietbus.plots.signals import euler_angles, jitter, rate_spectrum, rotor_frequencies
-from quietbus.plots.style import draw_line, envelope, new_figure, scaled, share_legend, style
+from quietbus.plots.style import (
+    draw_line,
+    envelope,
+    new_figure,
+    scaled,
+    share_legend,
+    span_text,
+    style,
+)
 from quietbus.results import VARIABLES
 from quietbus.scenario import load_scenario
 
@@ -139,6 +147,19 @@ def test_jitter_and_spectrum_show_the_amplitude_that_was_put_in():
 def test_the_picture_for_newcomers_tells_the_reduction():
     story = compare_figures(pair())["rates"].get_suptitle()
     assert "20 to 90 times less" in story
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "text"),
+    [
+        (17.96, 18.04, "18"),
+        (17.0, 18.04, "17 to 18"),
+        (0.00999, 0.01, "0.01"),
+        (0.0, 2.0, "0 to 2"),
+    ],
+)
+def test_a_range_whose_ends_read_alike_is_one_number(low, high, text):
+    assert span_text(low, high, 2) == text
 
 
 def test_attitude_is_roll_pitch_yaw_and_the_target_stands_still():

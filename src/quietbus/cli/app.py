@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import signal
 import sys
-from typing import Any
+from importlib.metadata import version
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
@@ -30,11 +31,28 @@ class _InOrderOfWork(TyperGroup):
 app = typer.Typer(
     cls=_InOrderOfWork,
     name="quietbus",
-    help="Design, simulate and verify vibration isolation platforms for CMGs on satellites.",
     no_args_is_help=True,
     pretty_exceptions_show_locals=False,
     rich_markup_mode=None,
 )
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        print(f"quietbus {version('quietbus')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _common(
+    _: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_print_version, is_eager=True, help="Print the version."
+        ),
+    ] = False,
+) -> None:
+    """Design, simulate and verify vibration isolation platforms for CMGs on satellites."""
 
 
 def main() -> None:

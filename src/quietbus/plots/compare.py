@@ -29,6 +29,7 @@ from quietbus.plots.style import (
     new_figure,
     scaled,
     share_legend,
+    span_text,
     style,
 )
 from quietbus.results import scenario_of, summarize
@@ -136,7 +137,7 @@ def envelope_comparison(runs: Mapping[str, xr.Dataset]) -> Figure:
         if np.isfinite(passed[:, i]).any():
             draw_line(ratio, time, 100.0 * passed[:, i], color="black")
             least, most = 100.0 * np.nanmin(passed[:, i]), 100.0 * np.nanmax(passed[:, i])
-            ratio.set_title(f"{least:.3g} to {most:.3g} %")
+            ratio.set_title(f"{span_text(least, most, 3)} %")
     if largest > NOISE:
         every = np.concatenate([values[values > 1e-6 * largest] for values in envelopes.values()])
         log_scale(panels[1, 0], 0.5 * factor * float(every.min()), 2.0 * factor * largest)
@@ -306,4 +307,4 @@ def _story(runs: Mapping[str, xr.Dataset]) -> str:
     least, most = np.sort(left[1] / left[0])[[0, -1]]
     if least < 1.0:
         return f"{title}: the platform leaves up to {1.0 / least:.2g} times the jitter"
-    return f"With the isolation platform the bus jitters {least:.2g} to {most:.2g} times less"
+    return f"With the isolation platform the bus jitters {span_text(least, most, 2)} times less"

@@ -152,3 +152,9 @@ def scaled(peak: float, unit: str) -> tuple[float, str]:
         return 1.0, unit
     exponent = 3 * int(np.floor(np.log10(peak) / 3.0 + 1e-9))
     return (1.0, unit) if exponent == 0 else (10.0**-exponent, rf"$10^{{{exponent}}}$ {unit}")
+
+
+def span_text(low: float, high: float, digits: int) -> str:
+    """Two numbers as a range; one number where they read alike: "18", not "18 to 18"."""
+    first, last = f"{low:.{digits}g}", f"{high:.{digits}g}"
+    return first if first == last else f"{first} to {last}"

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from quietbus import api
 from quietbus.build import build_satellite
-from quietbus.plots.style import COLOURS, DASHES, new_figure, share_legend
+from quietbus.plots.style import COLOURS, DASHES, new_figure, share_legend, span_text
 from quietbus.reproduce.paper import Findings
 from quietbus.reproduce.zhang2012.bench import Bench, jitter_peak
 from quietbus.scenario import Scenario
@@ -79,7 +79,7 @@ def sensitivity(bench: Bench) -> Findings:
 
 def _span(numbers: dict[str, float], name: str) -> str:
     low, high = numbers[f"sensitivity_{name}_low"], numbers[f"sensitivity_{name}_high"]
-    return f"{low:.2g} to {high:.2g} %"
+    return f"{span_text(low, high, 2)} %"
 
 
 def _draw(axes: Axes, values: np.ndarray, ratios: np.ndarray) -> None:
