@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 import difflib
 import math
 import os
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,6 +19,7 @@ from quietbus.scenario import Problem, ScenarioError
 from quietbus.scenario.text import write_yaml
 from quietbus.scenario.units import Quantity, shown
 from quietbus.scenario.wheel_files import KINDS
+from quietbus.scenario.wheel_files.lines import read_cells
 
 KEYS = ("component", "unit", "speed_unit", "frequency_unit", "window", "sample_rate")
 _SPEED = Quantity("a rotor speed", "rad/s", above=0.0)
@@ -241,6 +240,7 @@ def _read_netcdf(file: Path) -> xr.Dataset:
             about[f"{axis}_unit"] = str(data[axis].attrs.get("units", ""))
         values = array.transpose("speed", "frequency").to_numpy().astype(float)
         speed, frequency = (data[a].to_numpy().astype(float) for a in ("speed", "frequency"))
+        speed, values = _rising(check, speed, values)
         maps.append(check.component(str(name), speed, frequency, values, about))
     check.raise_any()
     return xr.merge([each for each in maps if each is not None])
@@ -254,7 +254,7 @@ def _read_csv(file: Path) -> xr.Dataset:
     except (OSError, UnicodeDecodeError) as error:
         raise MapError(str(file), [Problem(f"cannot be read as text: {error}")]) from None
     about: dict[str, str] = {}
-    rows: list[tuple[int, list[str]]] = []
+    numbered: list[tuple[int, str]] = []
     for number, line in enumerate(lines, 1):
         if line.startswith("#"):
             key, colon, value = (part.strip() for part in line[1:].partition(":"))
@@ -264,9 +264,12 @@ def _read_csv(file: Path) -> xr.Dataset:
                 about[key] = value
             elif colon and (close := difflib.get_close_matches(key.lower(), KEYS, 1, 0.8)):
                 check.wrong(f"unknown key {shown(key)}; did you mean '{close[0]}'?", line=number)
-        elif line.strip():
-            cells = next(csv.reader([line], delimiter=";" if ";" in line else ","))
-            rows.append((number, [cell.strip() for cell in cells]))
+        else:
+            numbered.append((number, line.strip()))
+    try:
+        rows = read_cells(file, numbered).rows
+    except ScenarioError as error:
+        raise MapError(error.source, error.problems) from None
     if len(rows) < 2:
         check.wrong("expected a row of frequencies and one for each speed, got no map")
     check.raise_any()
@@ -278,19 +281,34 @@ def _read_csv(file: Path) -> xr.Dataset:
     return xr.merge([each for each in maps if each is not None])
 
 
-def _numbers(check: _Check, cells: Mapping[str, str], line: int) -> list[float]:
-    """Cells by column as numbers of at least 0, which speeds, frequencies and values are."""
-    found = []
-    for column, cell in cells.items():
-        try:
-            number = float(cell)
-        except ValueError:
-            number = math.nan
-        if not 0.0 <= number < math.inf:
-            what = f"expected a number of at least 0, got {shown(cell)}"
-            check.wrong(what, column, line)
-        found.append(number)
-    return found
+def _rising(check: _Check, speed: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Speeds above 0 that ascend, with their rows: a rig may slow down, or turn the rotor back.
+
+    A rotor that turns backwards has the spectra of one that turns forwards: they have no sign.
+    """
+    if np.any(speed > 0.0) and np.any(speed < 0.0):
+        check.wrong(
+            f"expected speeds of one sense of rotation, got {speed[speed < 0.0][0]:g} and "
+            f"{speed[speed > 0.0][0]:g}: fit each by itself",
+            "speed",
+        )
+    elif np.any(speed < 0.0):
+        speed = np.abs(speed)
+    if len(speed) == len(values) and len(speed) > 1 and np.all(np.diff(speed) < 0.0):
+        return speed[::-1], values[::-1]
+    return speed, values
+
+
+def _number(check: _Check, cell: str, column: str, line: int, least: float = 0.0) -> float:
+    """A cell as a number of at least 0, as frequencies and values are; speeds may be less."""
+    try:
+        number = float(cell)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number) or number < least:
+        what = "a number of at least 0" if least == 0.0 else "a number"
+        check.wrong(f"expected {what}, got {shown(cell)}", column, line)
+    return number
 
 
 def _matrix(
@@ -298,18 +316,19 @@ def _matrix(
 ) -> xr.DataArray | None:
     line, head = rows[0]
     columns = [f"column {i}" for i in range(1, len(head) + 1)]
-    frequency = np.array(_numbers(check, dict(zip(columns[1:], head[1:], strict=True)), line))
+    places = list(zip(columns[1:], head[1:], strict=True))
+    frequency = np.array([_number(check, cell, column, line) for column, cell in places])
     speed, values = [], []
     for number, cells in rows[1:]:
         if len(cells) != len(head):
             check.wrong(f"expected {len(head)} cells, got {len(cells)}", line=number)
             continue
-        first, *rest = _numbers(check, dict(zip(columns, cells, strict=True)), number)
-        speed.append(first)
-        values.append(rest)
+        speed.append(_number(check, cells[0], columns[0], number, -math.inf))
+        places = list(zip(columns[1:], cells[1:], strict=True))
+        values.append([_number(check, cell, column, number) for column, cell in places])
     check.raise_any()
-    name = about.get("component", "")
-    return check.component(name, np.array(speed), frequency, np.array(values), about)
+    rising, power = _rising(check, np.array(speed), np.array(values))
+    return check.component(about.get("component", ""), rising, frequency, power, about)
 
 
 def _long(
@@ -332,7 +351,10 @@ def _long(
             continue
         row = dict(zip(head, cells, strict=True))
         component = row.get("component") or about.get("component", "")
-        speed, frequency, value = _numbers(check, {name: row[name] for name in known[1:]}, number)
+        speed = _number(check, row["speed"], "speed", number, -math.inf)
+        frequency, value = (
+            _number(check, row[name], name, number) for name in ("frequency", "value")
+        )
         place = points.setdefault(component, {})
         if (speed, frequency) in place:
             check.wrong(
@@ -351,6 +373,7 @@ def _long(
             check.wrong(f"expected every speed with every frequency; {missing} are missing",
                         component)  # fmt: skip
             continue
+        speeds, values = _rising(check, speeds, values)
         maps.append(check.component(component, speeds, frequencies, values, about))
     return maps
 

@@ -136,6 +136,8 @@ def decimal_comma(text: str) -> str | None:
 
 def _with_points(file: Path, rows: list[tuple[int, list[str]]]) -> Cells:
     """Decimal commas as points; refused where both occur."""
+    if not any("," in cell for _, cells in rows for cell in cells):
+        return Cells(rows)
     first: tuple[int, str] | None = None
     point: tuple[int, str] | None = None
     read = []
