@@ -11,6 +11,7 @@ from typing import Any
 import h5netcdf
 import xarray as xr
 
+from quietbus.results.characters import as_characters
 from quietbus.results.schema import VARIABLES
 from quietbus.writing import replacing
 
@@ -24,7 +25,7 @@ def save_run(run: xr.Dataset, path: str | os.PathLike[str]) -> None:
     with replacing(path, "run (NetCDF-4)") as file:
         disk = _Disk(file.raw)
         with h5netcdf.File(disk, "w") as stored:
-            run.dump_to_store(xr.backends.H5NetCDFStore(stored))
+            as_characters(run).dump_to_store(xr.backends.H5NetCDFStore(stored))
         if disk.refused is not None:
             raise disk.refused
 
