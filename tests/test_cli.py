@@ -153,16 +153,55 @@ def test_run_that_diverges_keeps_what_it_has_and_ends_with_status_1(command, tmp
     assert qb.load_run(tmp_path / "run.nc").attrs["status"] == "stopped"
 
 
+def _until(ready, process, seconds=180.0):
+    """Wait until something is there, while the program runs."""
+    ending = time.monotonic() + seconds
+    while not ready():
+        assert process.poll() is None, process.returncode
+        assert time.monotonic() < ending
+        time.sleep(0.2)
+
+
 @pytest.mark.slow
-def test_ctrl_c_keeps_the_run_and_ends_with_status_1(tmp_path):
-    arguments = ["simulate", "zhang2012", "--duration", "3000 s", "-o", str(tmp_path / "run.nc")]
-    process = subprocess.Popen([sys.executable, "-m", "quietbus", *arguments])
-    time.sleep(12.0)
-    process.send_signal(signal.SIGINT)
-    assert process.wait(timeout=120.0) == 1
-    run = qb.load_run(tmp_path / "run.nc")
-    assert run.attrs["status"] == "interrupted"
-    assert 0.0 < run.time[-1] < 2999.0
+def test_killed_and_interrupted_runs_keep_what_they_have_and_go_on(tmp_path, command):
+    """Killed, resumed, stopped by SIGTERM (as by Ctrl-C), then resumed to the end."""
+    output, checkpoint = tmp_path / "run.nc", tmp_path / "run.nc.checkpoint"
+    arguments = ["simulate", "zhang2012", "--duration", "400 s", "-o", str(output)]
+    arguments += ["--output-rate", "260 Hz"]
+    start = lambda *more: subprocess.Popen(  # noqa: E731
+        [sys.executable, "-m", "quietbus", *arguments, *more], stderr=subprocess.PIPE, text=True
+    )
+    process = start()
+    _until(lambda: checkpoint.exists() and checkpoint.stat().st_size > 50_000, process)
+    process.kill()
+    process.communicate()
+    assert not output.exists()
+    killed = qb.load_run(checkpoint)
+    assert killed.attrs["status"] == "interrupted"
+    assert killed.time[-1] > 0.5
+    status, _, err = command(*arguments)
+    assert status == 2
+    assert "holds this very run up to t = " in err
+    process, size = start("--resume"), checkpoint.stat().st_size
+    _until(lambda: checkpoint.stat().st_size > size, process)
+    process.send_signal(signal.SIGTERM)
+    _, err = process.communicate(timeout=120.0)
+    assert process.returncode == 1
+    assert "the same command with --resume goes on from there" in err
+    stopped = qb.load_run(output)
+    assert stopped.attrs["status"] == "interrupted"
+    assert killed.time[-1] < stopped.time[-1] < 399.0
+    assert killed.equals(stopped.isel(time=slice(killed.sizes["time"])))
+    assert qb.load_run(checkpoint).equals(stopped)
+
+
+def test_what_cannot_be_resumed_is_told_at_once(command, tmp_path):
+    status, _, err = command("simulate", "zhang2012", "-o", "run.nc", "--resume")
+    assert status == 2
+    assert "run.nc.checkpoint: no such file, so there is nothing to resume" in err
+    status, _, err = command("compare", "zhang2012", "-o", "out", "--resume")
+    assert status == 2
+    assert "nothing to resume" in err
 
 
 def test_run_that_cannot_be_written_is_kept_elsewhere(command, tmp_path, monkeypatch):

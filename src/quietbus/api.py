@@ -1,13 +1,14 @@
 """The verbs of quietbus: load, build, solve, and give labelled results."""
 
 import concurrent.futures
+import os
+import pathlib
 import threading
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
-import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
@@ -15,15 +16,16 @@ from numpy.typing import ArrayLike
 from quietbus.build import build_initial_state, build_satellite
 from quietbus.dynamics.linearize import Actuator, LinearModel, OperatingPoint
 from quietbus.dynamics.linearize import linearize as linearize_satellite
-from quietbus.dynamics.vibration import View
 from quietbus.jitter_study import JitterStudy
 from quietbus.platform_study import PlatformStudy
 from quietbus.resolution import refuse_coarse_output, refuse_coarse_tolerance, unseen
 from quietbus.results import aliasing, rotor_notes, to_dataset
+from quietbus.results.checkpoint import Checkpoint
+from quietbus.results.task import Task
 from quietbus.scenario import LineOfSight, Problem, Scenario, ScenarioError, load_scenario
 from quietbus.scenario.pointing import NO_REQUIREMENTS
 from quietbus.scenario.wheels import WheelCluster
-from quietbus.solve.direct import Scheme, Tolerances, integrate
+from quietbus.solve.direct import Reached, Scheme, Tolerances, integrate
 from quietbus.solve.harmonic import integrate_harmonic, on_periodic_solution
 from quietbus.solve.noise import with_noise
 from quietbus.study import Study
@@ -32,6 +34,9 @@ from quietbus.verification import Verification, check_requirements
 Mount = Literal["isolated", "rigid"]
 METHODS = ("direct", "harmonic")
 HARMONIC_RATE = 10.0  # [Hz] of the outputs of a harmonic run, unless asked for otherwise
+
+
+Notes = tuple[str, ...]
 
 
 class QuietbusWarning(UserWarning):
@@ -57,6 +62,8 @@ def simulate(
     points: Mapping[str, ArrayLike] | None = None,
     lines_of_sight: Mapping[str, ArrayLike] | None = None,
     progress: Callable[[float], None] | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
+    resume: bool = False,
 ) -> xr.Dataset:
     """Simulate a scenario.
 
@@ -73,6 +80,12 @@ def simulate(
         lines_of_sight: what the jitter is wanted of, beside the scenario's own: by name a (3,)
             direction, bus frame, or a (1 to 3, 12) sensitivity as in docs/scenario.md (harmonic).
         progress: called with the simulated time reached [s].
+        checkpoint: a file to which what is computed is added while the run goes, about every five
+            seconds of wall time and at its end. ``load_run`` reads it, also when the program was
+            killed. An older one of another run is replaced; this one stays: delete it when
+            the run is in safety.
+        resume: go on from ``checkpoint``, where the same run has left off; begin where there is
+            none yet.
 
     Returns:
         The run, as described in docs/results.md. After Ctrl-C it holds what was computed, with
@@ -82,6 +95,9 @@ def simulate(
         ScenarioError: the scenario is not valid, or the output rate or tolerance of a direct run
             is too coarse for a declared disturbance.
         ValueError: an unknown method or mount.
+        CheckpointError: (a ValueError) to resume, a checkpoint that cannot be read or is of
+            another run; to begin, one that holds a part of this very run.
+        OutputError: (an OSError) the checkpoint cannot be begun.
         ResonanceError: an order of a rotor lies on an undamped mode (harmonic).
         SimulationError: the run diverged, or its output rate could not show the gimbal motors'
             ripple; what was computed until then is in its ``run``.
@@ -93,14 +109,16 @@ def simulate(
         if joint_forces:
             raise ValueError("joint_forces needs method 'direct'")
         scenario = _as_run(scenario, mount, duration, output_rate or HARMONIC_RATE)
-        run, notes = _harmonic(scenario, points or {}, lines_of_sight or {}, progress)
+        task = _harmonic_task(scenario, points or {}, lines_of_sight or {})
+        run, notes = _kept(_harmonic, task, progress, checkpoint, resume)
     else:
         if points or lines_of_sight:
             raise ValueError("points and lines_of_sight need method 'harmonic'")
         scenario = _as_run(scenario, mount, duration, output_rate)
         refuse_coarse_output(scenario)
-        run = _direct(scenario, joint_forces, progress)
-        notes = tuple(filter(None, [aliasing(scenario)]))
+        task = Task(scenario, "direct", joint_forces)
+        run, notes = _kept(_direct, task, progress, checkpoint, resume)
+        notes += tuple(filter(None, [aliasing(scenario)]))
     for note in (*notes, *rotor_notes(run)):
         warnings.warn(note, QuietbusWarning, stacklevel=2)
     if run.attrs["status"] == "stopped":
@@ -119,6 +137,8 @@ def compare(
     *,
     duration: float | None = None,
     progress: Callable[[Mount, float], None] | None = None,
+    checkpoints: Mapping[Mount, str | os.PathLike[str]] | None = None,
+    resume: bool = False,
 ) -> dict[str, xr.Dataset]:
     """The same scenario on both mounts, side by side on two cores.
 
@@ -127,9 +147,10 @@ def compare(
     Args:
         duration: [s], instead of the scenario's own.
         progress: called with the mount and the simulated time reached [s].
+        checkpoints, resume: as of ``simulate``, a file for each mount.
     """
     mounts: tuple[Mount, ...] = ("isolated", "rigid")
-    stop = threading.Event()
+    stop, troubles = threading.Event(), list[str]()
 
     def run(mount: Mount) -> xr.Dataset:
         def tell(t: float) -> None:
@@ -138,7 +159,10 @@ def compare(
             if stop.is_set():
                 raise KeyboardInterrupt
 
-        return _direct(_as_run(scenario, mount, duration), False, tell)
+        task = Task(_as_run(scenario, mount, duration), "direct")
+        done, said = _kept(_direct, task, tell, (checkpoints or {}).get(mount), resume)
+        troubles.extend(said)
+        return done
 
     refuse_coarse_output(_as_run(scenario, None, duration))
     warning = aliasing(_as_run(scenario, None, duration))
@@ -153,6 +177,8 @@ def compare(
         runs: dict[str, xr.Dataset] = {}
         for mount, future in futures.items():
             runs[mount] = future.result()
+    for trouble in troubles:
+        warnings.warn(trouble, QuietbusWarning, stacklevel=2)
     for name, done in runs.items():
         aliased = _aliased(_as_run(scenario, None, duration), done)
         for note in (*filter(None, [aliased]), *rotor_notes(done)):
@@ -362,20 +388,62 @@ def _as_run(
     return scenario.with_overrides({k: v for k, v in wanted.items() if v is not None})
 
 
+class _Keeping:
+    """Where a run begins, and what becomes of what it reaches."""
+
+    def __init__(self, file: Checkpoint | None, start: Reached | None):
+        self.file, self.start, self.begun = file, start, time.perf_counter()
+
+    @property
+    def keep(self) -> Callable[[Reached], None] | None:
+        return None if self.file is None else self.file.keep
+
+    def wall_time(self) -> float:
+        """[s] that the run has taken, before a resumption too."""
+        return time.perf_counter() - self.begun if self.file is None else self.file.wall_time
+
+
+def _kept(
+    solve: Callable[[Task, Callable[[float], None] | None, _Keeping], tuple[xr.Dataset, Notes]],
+    task: Task,
+    progress: Callable[[float], None] | None,
+    checkpoint: str | os.PathLike[str] | None,
+    resume: bool,
+) -> tuple[xr.Dataset, Notes]:
+    """The run, kept in a checkpoint while it goes, and what the user should know of it."""
+    if checkpoint is None:
+        if resume:
+            raise ValueError("resume needs a checkpoint")
+        return solve(task, progress, _Keeping(None, None))
+    if resume and pathlib.Path(checkpoint).exists():
+        file, start = Checkpoint.resume(checkpoint, task)
+    else:
+        file, start = Checkpoint.create(checkpoint, task), None
+    try:
+        run, notes = solve(task, progress, _Keeping(file, start))
+    finally:
+        file.close()
+        if not file.rows:
+            pathlib.Path(checkpoint).unlink(missing_ok=True)
+    if file.trouble:
+        notes += (f"{checkpoint}: holds only a part of the run: {file.trouble}",)
+    return run, notes
+
+
 def _direct(
-    scenario: Scenario, joint_forces: bool, progress: Callable[[float], None] | None
-) -> xr.Dataset:
-    if joint_forces and scenario.isolator.mount == "rigid":
+    task: Task, progress: Callable[[float], None] | None, keeping: _Keeping
+) -> tuple[xr.Dataset, Notes]:
+    scenario = task.scenario
+    if task.joint_forces and scenario.isolator.mount == "rigid":
         raise ValueError(
             "joint_forces needs mount 'isolated': on a rigid mount the legs' forces are not "
             "determined, since the plate is held by the mount and not by the legs"
         )
-    started = time.perf_counter()
     satellite = build_satellite(scenario)
     settings = scenario.simulation
     state = build_initial_state(scenario, satellite)
     refuse_coarse_tolerance(scenario, satellite, state)
-    if scenario.initial.steady:
+    if scenario.initial.steady and keeping.start is None:
         state = on_periodic_solution(satellite, state)
     solution = integrate(
         with_noise(satellite, scenario.cluster.seeds, settings.duration),
@@ -383,27 +451,30 @@ def _direct(
         settings.duration,
         settings.output_rate,
         Tolerances(settings.tolerances.relative, settings.tolerances.absolute),
-        Scheme(joint_forces=joint_forces),
+        Scheme(joint_forces=task.joint_forces),
         progress,
+        keeping.keep,
+        keeping.start,
     )
-    return to_dataset(scenario, solution, time.perf_counter() - started)
+    return to_dataset(scenario, solution, keeping.wall_time()), ()
 
 
-def _harmonic(
+def _harmonic_task(
     scenario: Scenario,
     points: Mapping[str, ArrayLike],
     lines_of_sight: Mapping[str, ArrayLike],
-    progress: Callable[[float], None] | None,
-) -> tuple[xr.Dataset, tuple[str, ...]]:
-    """The run, and what the user should know of it."""
-    at = [_vector(f"points[{name!r}]", p, 3) for name, p in points.items()]
+) -> Task:
+    at = {name: _vector(f"points[{name!r}]", p, 3) for name, p in points.items()}
     own = {name: line.matrix() for name, line in scenario.lines_of_sight.items()}
-    lines_of_sight = own | dict(lines_of_sight)
-    along = [_sensitivity(f"lines_of_sight[{n!r}]", given) for n, given in lines_of_sight.items()]
-    view = View(
-        jnp.asarray(np.array(at).reshape(-1, 3)), jnp.asarray(np.array(along).reshape(-1, 3, 12))
-    )
-    started = time.perf_counter()
+    given = own | dict(lines_of_sight)
+    lines = {name: _sensitivity(f"lines_of_sight[{name!r}]", each) for name, each in given.items()}
+    return Task(scenario, "harmonic", points=at, lines_of_sight=lines)
+
+
+def _harmonic(
+    task: Task, progress: Callable[[float], None] | None, keeping: _Keeping
+) -> tuple[xr.Dataset, Notes]:
+    scenario = task.scenario
     satellite = build_satellite(scenario)
     solution = integrate_harmonic(
         satellite,
@@ -411,9 +482,11 @@ def _harmonic(
         scenario.simulation.duration,
         scenario.simulation.output_rate,
         steady=scenario.initial.steady,
-        view=view,
+        view=task.view(),
         progress=progress,
+        keep=keeping.keep,
+        start=keeping.start,
     )
-    wall_time = time.perf_counter() - started
-    run = to_dataset(scenario, solution, wall_time, points, lines_of_sight)
+    points, lines = task.points, task.lines_of_sight
+    run = to_dataset(scenario, solution, keeping.wall_time(), points, lines)
     return run, solution.jitter.warnings

@@ -20,6 +20,7 @@ from typing import Any
 # how files of a kind begin; an older one of that kind may be replaced
 BEGINNINGS: Mapping[str, tuple[bytes, ...]] = {
     "run (NetCDF-4)": (b"\x89HDF\r\n\x1a\n",),
+    "checkpoint": (b"quietbus checkpoint 1\n",),
     "page (HTML)": (b"<!DOCTYPE html>", b"<!doctype html>"),
     "disturbance block (YAML)": (b"disturbance:",),
     "new scenario (YAML)": (),  # never replaced

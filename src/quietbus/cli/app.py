@@ -56,8 +56,10 @@ def _common(
 
 
 def main() -> None:
-    """Entry point: one clear message for bad input, no traceback; Ctrl-C ends with status 1."""
-    signal.signal(signal.SIGINT, on_interrupt)
+    """Entry point: one clear message for bad input, no traceback; 1 after Ctrl-C and SIGTERM."""
+    for ending in (signal.SIGINT, signal.SIGTERM):
+        if signal.getsignal(ending) != signal.SIG_IGN:  # as of a command in a script's background
+            signal.signal(ending, on_interrupt)
     try:
         app()
     except OutputError as error:  # a disk that has become full, or the like

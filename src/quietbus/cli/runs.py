@@ -54,6 +54,9 @@ def simulate(
     joint_forces: Annotated[
         bool, typer.Option("--joint-forces", help="Also keep the forces in the legs' joints.")
     ] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on where this run was interrupted or killed.")
+    ] = False,
 ) -> None:
     """Simulate a scenario; write the run and print what one wants to know of it."""
     checked = load(scenario, mount, duration, output_rate)
@@ -61,6 +64,7 @@ def simulate(
     name = f"{re.sub(r'[^A-Za-z0-9._-]+', '-', checked.name)[:LONGEST]}-{chosen}"
     output = output or Path(f"{name}-harmonic.nc" if method == Method.harmonic else f"{name}.nc")
     check_file(output, RUN)
+    checkpoint = _checkpoint_of(output, resume)
     if joint_forces and method == Method.harmonic:
         raise BadInput("--joint-forces needs --method direct")
     if joint_forces and chosen == Mount.rigid:
@@ -68,6 +72,7 @@ def simulate(
     import_heavy()
     from quietbus import api
     from quietbus.results import summarize
+    from quietbus.results.checkpoint import CheckpointError
     from quietbus.solve.harmonic import ResonanceError
     from quietbus.tables import summary_table
 
@@ -81,22 +86,39 @@ def simulate(
                     output_rate=checked.simulation.output_rate if output_rate else None,
                     joint_forces=joint_forces,
                     progress=lambda t: tell(chosen, t),
+                    checkpoint=checkpoint,
+                    resume=resume,
                 )
+            except CheckpointError as error:
+                raise BadInput(str(error)) from None
             except api.SimulationError as error:
                 run, failed = error.run, str(error)
             except ResonanceError as error:
                 raise BadInput(f"{scenario}: {error}") from None
         troubles = save(run, output)
+        if not troubles and run.attrs["status"] != "interrupted":
+            checkpoint.unlink(missing_ok=True)
     if run.sizes["time"] > 1:
         print_table(summary_table({chosen: summarize(run)}))
     else:
         print("one instant only, so there is no table")
     if run.attrs["status"] != "complete":
         troubles.append(f"the run is not complete: {run.attrs['stop_reason']}")
+        if checkpoint.exists():
+            troubles.append("the same command with --resume goes on from there")
     elif failed:
         troubles.append(failed)
     if troubles:
         fail("; ".join(troubles))
+
+
+def _checkpoint_of(output: Path, resume: bool) -> Path:
+    """The file beside a run that keeps what is computed until the run is written."""
+    checkpoint = output.with_name(f"{output.name}.checkpoint")
+    check_file(checkpoint, "checkpoint")
+    if resume and not checkpoint.exists():
+        raise BadInput(f"{checkpoint}: no such file, so there is nothing to resume")
+    return checkpoint
 
 
 @app.command()
@@ -104,28 +126,49 @@ def compare(
     scenario: ScenarioArgument,
     output: FolderOption = OUT,
     duration: DurationOption = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on where these runs were interrupted or killed.")
+    ] = False,
 ) -> None:
     """Simulate with the isolator and without, side by side, with pictures."""
     checked = load(scenario, None, duration)
     make_folder(output, "summary.json")
-    for each in Mount:
-        check_file(output / f"{each}.nc", RUN)
+    files = {each: output / f"{each}.nc" for each in Mount}
+    for file in files.values():
+        check_file(file, RUN)
+    checkpoints = {each: _checkpoint_of(file, False) for each, file in files.items()}
+    if resume and not any(each.exists() for each in checkpoints.values()):
+        raise BadInput(f"{output}: no checkpoints in it, so there is nothing to resume")
     import_heavy()
     from quietbus import api
     from quietbus.plots import compare_figures, run_figures, save_figures
     from quietbus.results import summarize
+    from quietbus.results.checkpoint import CheckpointError
     from quietbus.tables import summary_table
 
     with keeping_results():
         with progress(dict.fromkeys(Mount, checked.simulation.duration)) as tell, notes():
-            runs = api.compare(checked, progress=tell)
+            try:
+                runs = api.compare(
+                    checked,
+                    progress=tell,
+                    checkpoints={each.value: file for each, file in checkpoints.items()},
+                    resume=resume,
+                )
+            except CheckpointError as error:
+                raise BadInput(str(error)) from None
         troubles = []
         for mount, run in runs.items():
-            troubles += save(run, output / f"{mount}.nc")
+            troubles += save(run, files[Mount(mount)])
+        if not troubles and not Stop.asked:
+            for checkpoint in checkpoints.values():
+                checkpoint.unlink(missing_ok=True)
+        for mount, run in runs.items():
             if run.attrs["status"] != "complete":
                 troubles.append(f"the {mount} run is not complete: {run.attrs['stop_reason']}")
     if Stop.asked:
         print(f"no pictures of an interrupted comparison; `quietbus plot {output}/isolated.nc`")
+        troubles.append("the same command with --resume goes on from there")
     elif all(run.sizes["time"] > 1 for run in runs.values()):
         summaries = {str(mount): summarize(run) for mount, run in runs.items()}
         print_table(summary_table(summaries))

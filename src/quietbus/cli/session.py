@@ -1,8 +1,9 @@
-"""What a command shows while it works, and how Ctrl-C stops it."""
+"""What a command shows while it works, and how Ctrl-C and SIGTERM stop it."""
 
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -16,19 +17,18 @@ if TYPE_CHECKING:
 
 
 class Stop:
-    """What Ctrl-C does. Set as a flag: an exception in the middle of JAX would be lost or worse."""
+    """What Ctrl-C and SIGTERM do: a flag, since an exception amid JAX would be lost or worse."""
 
     keeping = False  # a run is under way, whose results are to be kept
     asked = False
 
 
-def on_interrupt(_signal: int, _frame: object) -> None:
+def on_interrupt(number: int, _frame: object) -> None:
     # os.write, since Python's own buffers may be in use where the signal comes in between
     if Stop.keeping and not Stop.asked:
         Stop.asked = True
-        os.write(
-            2, b"\nquietbus: stopping and keeping what is computed; Ctrl-C again quits at once\n"
-        )
+        again = b"; Ctrl-C again quits at once" if number == signal.SIGINT else b""
+        os.write(2, b"\nquietbus: stopping and keeping what is computed" + again + b"\n")
         return
     os.write(2, b"\nquietbus: interrupted\n")
     os._exit(FAILED)
@@ -36,7 +36,7 @@ def on_interrupt(_signal: int, _frame: object) -> None:
 
 @contextmanager
 def keeping_results() -> Iterator[None]:
-    """From here the first Ctrl-C stops the run, not the program."""
+    """From here the first Ctrl-C or SIGTERM stops the run, not the program."""
     Stop.keeping, Stop.asked = True, False
     try:
         yield

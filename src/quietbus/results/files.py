@@ -12,6 +12,7 @@ import h5netcdf
 import xarray as xr
 
 from quietbus.results.characters import as_characters
+from quietbus.results.checkpoint import is_checkpoint, read, to_run
 from quietbus.results.schema import VARIABLES
 from quietbus.writing import replacing
 
@@ -106,7 +107,9 @@ class _Disk(io.RawIOBase):
 
 
 def load_run(path: str | os.PathLike[str]) -> xr.Dataset:
-    """Read a run that ``save_run`` or ``quietbus simulate -o`` has written.
+    """Read a run that ``save_run`` or ``quietbus simulate -o`` has written, or a checkpoint.
+
+    A checkpoint, of a run that goes on or was killed, is a run of status "interrupted".
 
     Raises:
         FileNotFoundError: no such file.
@@ -116,6 +119,8 @@ def load_run(path: str | os.PathLike[str]) -> xr.Dataset:
         raise ValueError(f"{path}: is a folder; expected the file of a run")
     if not pathlib.Path(path).is_file():
         raise FileNotFoundError(f"{path}: no such file")
+    if is_checkpoint(path):
+        return to_run(read(path), str(path))
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of xarray, about files that are no runs anyway

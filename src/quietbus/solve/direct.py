@@ -64,6 +64,18 @@ class Solution:
     interrupted: bool  # the user stopped it
 
 
+@dataclass(frozen=True)
+class Reached:
+    """How far a run has come, and all that is needed to go on as if it had never stopped."""
+
+    time: float  # [s] at the end of a whole piece
+    step: float  # [s] to try next
+    state: State
+    steps: int
+    rejected: int
+    kept: tuple[Outputs, State | None]  # at the output instants before, time as the first axis
+
+
 def integrate(
     satellite: Satellite,
     initial: State,
@@ -72,6 +84,8 @@ def integrate(
     tolerances: Tolerances | None = None,
     scheme: Scheme | None = None,
     progress: Callable[[float], None] | None = None,
+    keep: Callable[[Reached], None] | None = None,
+    start: Reached | None = None,
 ) -> Solution:
     """Integrate from t = 0 to ``duration`` [s], with outputs every 1/``output_rate`` [Hz].
 
@@ -80,6 +94,8 @@ def integrate(
 
     Args:
         progress: called with the time reached [s] after every piece.
+        keep: called before that with what has been reached.
+        start: what an earlier run with the same arguments had reached, to go on from there.
     """
     tolerances, scheme = tolerances or Tolerances(), scheme or Scheme()
     count = int(np.floor(duration * output_rate * (1.0 + 1e-12))) + 1
@@ -91,6 +107,12 @@ def integrate(
     state, t, done = initial, 0.0, 0
     steps = rejected = 0
     step = 1e-4
+    if start is not None:
+        state, t, step = start.state, start.time, start.step
+        steps, rejected = start.steps, start.rejected
+        before, structure = jax.tree.flatten(start.kept)
+        done = len(before[0])
+        store = _room(count, before)
     stopped, interrupted = None, False
     try:
         while t < finish and not stopped:
@@ -100,9 +122,9 @@ def integrate(
             ts = np.full(size, end)
             ts[: len(due)] = due
             piece = _piece(satellite, state, t, end, step, ts, tolerances, scheme)
-            arrays = [np.asarray(leaf) for leaf in jax.tree.leaves(piece.kept)]
-            if not store:
-                store = [np.empty((count, *leaf.shape[1:])) for leaf in arrays]
+            leaves, structure = jax.tree.flatten(piece.kept)
+            arrays = [np.asarray(leaf) for leaf in leaves]
+            store = store or _room(count, [leaf[:0] for leaf in arrays])
             valid = int(np.sum(np.asarray(piece.valid)[: len(due)]))
             for whole, part in zip(store, arrays, strict=True):
                 whole[done : done + valid] = part[:valid]
@@ -113,15 +135,25 @@ def integrate(
                 reached = float(piece.time_reached)
                 step = 0.9 * (reached - t) / max(int(piece.steps) - int(piece.rejected), 1)
                 state, t = piece.final, reached
+                if keep is not None:
+                    kept = jax.tree.unflatten(structure, [whole[:done] for whole in store])
+                    keep(Reached(t, step, state, steps, rejected, kept))
                 if progress is not None:
                     progress(t)
     except KeyboardInterrupt:
         stopped, interrupted = f"interrupted by the user at t = {t:g} s", True
     if not store:
         raise KeyboardInterrupt
-    structure = jax.tree.structure(piece.kept)
     reported, states = jax.tree.unflatten(structure, [whole[:done] for whole in store])
     return Solution(time[:done], reported, states, state, steps, rejected, stopped, interrupted)
+
+
+def _room(count: int, before: list[np.ndarray]) -> list[np.ndarray]:
+    """Arrays for all output instants, the first of them filled."""
+    room = [np.empty((count, *part.shape[1:])) for part in before]
+    for whole, part in zip(room, before, strict=True):
+        whole[: len(part)] = part
+    return room
 
 
 def _end_of_piece(t: float, finish: float, piece: float) -> float:

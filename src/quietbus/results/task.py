@@ -1,0 +1,69 @@
+"""What is asked of a run: all that its numbers depend on."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Self
+
+import jax.numpy as jnp
+import numpy as np
+
+from quietbus.dynamics.vibration import View
+from quietbus.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a run was asked for."""
+
+    scenario: Scenario  # as it is run, mount and output rate included
+    method: str
+    joint_forces: bool = False
+    points: Mapping[str, np.ndarray] = field(default_factory=dict)  # (3,) [m] by name
+    lines_of_sight: Mapping[str, np.ndarray] = field(default_factory=dict)  # (3, 12) by name
+
+    def view(self) -> View:
+        """Points and lines of sight of a harmonic run."""
+        points = np.array(list(self.points.values())).reshape(-1, 3)
+        lines = np.array(list(self.lines_of_sight.values())).reshape(-1, 3, 12)
+        return View(jnp.asarray(points), jnp.asarray(lines))
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        named = lambda arrays: {name: np.asarray(a).tolist() for name, a in arrays.items()}  # noqa: E731
+        return {
+            "scenario": self.scenario.to_yaml(),
+            "method": self.method,
+            "joint_forces": self.joint_forces,
+            "points": named(self.points),
+            "lines_of_sight": named(self.lines_of_sight),
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Self:
+        """What ``to_dict`` gave."""
+        named = lambda lists: {name: np.array(given) for name, given in lists.items()}  # noqa: E731
+        return cls(
+            Scenario.from_yaml(data["scenario"], source="the checkpoint's scenario"),
+            data["method"],
+            data["joint_forces"],
+            named(data["points"]),
+            named(data["lines_of_sight"]),
+        )
+
+
+def differences(one: Task, other: Task) -> list[str]:
+    """In what two tasks differ, in words; the scenario's fields by their paths."""
+    a, b = one.to_dict(), other.to_dict()
+    found = [name for name in a if name != "scenario" and a[name] != b[name]]
+    if a["scenario"] != b["scenario"]:
+        fields = _differing(one.scenario.model_dump(), other.scenario.model_dump())
+        found += list(fields)[:5] or ["the scenario"]
+    return found
+
+
+def _differing(one: Any, other: Any, path: str = "") -> Iterator[str]:
+    if isinstance(one, dict) and isinstance(other, dict):
+        for key in one.keys() | other.keys():
+            yield from _differing(one.get(key), other.get(key), f"{path}.{key}".lstrip("."))
+    elif one != other:
+        yield path
