@@ -144,7 +144,7 @@ TORQUE = "broadband.radial_torque."
             TORQUE + "frequency[1]: expected at most 9 Hz, the Nyquist frequency of the table's",
         ),
         ({"table": 3}, "cluster.rotor.disturbance.table: expected the name of a file, got 3"),
-        ({"seed": -1}, "seed: expected a whole number of at least 0, got -1"),
+        ({"seed": -1}, "seed: expected a whole number from 0 to 2^63 - 1, got -1"),
     ],
 )
 def test_bad_tables_are_named_with_their_path(table, message):

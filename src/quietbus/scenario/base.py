@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, TypeVar
+from dataclasses import dataclass
+from typing import Annotated, Any, NoReturn, TypeVar
 
 import numpy as np
 from pydantic import (
@@ -11,24 +12,60 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Discriminator,
-    Field,
+    GetCoreSchemaHandler,
     Tag,
+    ValidationError,
     model_validator,
 )
-from pydantic_core import PydanticCustomError
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from quietbus.scenario.checks import inertia_defect, listed
-from quietbus.scenario.errors import UnknownKey
+from quietbus.scenario.errors import ScenarioError, UnknownKey, found
+from quietbus.scenario.limits import MOST_UNITS
 from quietbus.scenario.units import Quantity, expected
+from quietbus.words import visible
 
 T = TypeVar("T")
 ZERO = (0.0, 0.0, 0.0)
+LONGEST_NAME = 100  # [letters] so that the names of files made of it have room for more
+
+
+_UNCHANGED = "a scenario and its parts do not change; Scenario.with_overrides gives a changed copy"
+
+
+class FrozenDict(dict[str, T]):
+    """A dict that does not change, as a tuple is a list that does not."""
+
+    def _refuse(self, *_: Any, **__: Any) -> NoReturn:
+        raise TypeError(_UNCHANGED)
+
+    __setitem__ = __delitem__ = __ior__ = _refuse
+    clear = pop = popitem = setdefault = update = _refuse  # type: ignore[assignment]
+
+    def __reduce__(self) -> tuple[Any, ...]:  # a dict's own way sets item after item
+        return type(self), (dict(self),)
 
 
 class Part(BaseModel):
     """A mapping of the scenario: its keys are known, its values do not change."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+    def __init__(self, **data: Any) -> None:
+        try:
+            super().__init__(**data)
+        except ValidationError as error:
+            raise ScenarioError(type(self).__name__, found(error)) from None
+
+    # tells pydantic that parts within parts need not be made by this, so that all that is wrong
+    # is found at once
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+    def __setattr__(self, name: str, value: Any) -> NoReturn:
+        raise TypeError(_UNCHANGED)
+
+    def __delattr__(self, name: str) -> NoReturn:
+        raise TypeError(_UNCHANGED)
 
     @model_validator(mode="before")
     @classmethod
@@ -76,9 +113,56 @@ PerLeg = Annotated[
 ]
 
 
-def _count(value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-        raise expected("a count of at least 1", value)
+@dataclass(frozen=True)
+class Count:
+    """Type annotation of a whole number from 1 to ``most``."""
+
+    most: int = 10**9
+
+    def __get_pydantic_core_schema__(self, _: Any, __: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.read)
+
+    def read(self, value: Any) -> int:
+        """The number; a PydanticCustomError says what was expected and what came."""
+        if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+            raise expected("a count of at least 1", value)
+        if value > self.most:
+            raise expected(f"a count of at most {self.most:,}", value)
+        return value
+
+
+def name_defect(value: Any) -> str | None:
+    """Why a value cannot be a name, or None if it can.
+
+    Names stand in tables, pictures, pages and file names: one line of letters that have a glyph.
+    """
+    if not isinstance(value, str):
+        return "not a text"
+    if not value or value != value.strip():
+        return "a name neither is empty nor starts or ends with a space" if value else "it is empty"
+    if len(value) > LONGEST_NAME:
+        return f"{len(value)} letters"
+    if value != visible(value):
+        return "control letters, line ends, and letters that turn the direction of writing"
+    return None
+
+
+def bad_name(value: Any, defect: str) -> PydanticCustomError:
+    """The error of a value that cannot be a name."""
+    why = defect if isinstance(value, str) else ""
+    return expected(f"a name of 1 to {LONGEST_NAME} printable letters", value, why)
+
+
+def _name(value: Any) -> str:
+    defect = name_defect(value)
+    if defect is not None:
+        raise bad_name(value, defect)
+    return str(value)
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str) or not value:
+        raise expected("a text", value)
     return value
 
 
@@ -139,8 +223,9 @@ ProportionalGain = Annotated[float, Quantity("a proportional gain", "N*m/rad", l
 IntegralGain = Annotated[float, Quantity("an integral gain", "N*m/(rad*s)", least=0.0)]
 DerivativeGain = Annotated[float, Quantity("a derivative gain", "N*m*s/rad", least=0.0)]
 Zero = Annotated[float, Quantity("a zero of the controller", "1/s", least=0.0)]
-UnitCount = Annotated[int, BeforeValidator(_count)]
+UnitCount = Annotated[int, Count(MOST_UNITS)]
 UnitVector = Annotated[Vector[Number], AfterValidator(_unit_vector)]
 UnitVectors = Annotated[tuple[UnitVector, ...], listing(None, "unit vectors")]
 InertiaMatrix = Annotated[Matrix[Inertia], AfterValidator(_inertia)]
-Text = Annotated[str, Field(min_length=1)]
+Text = Annotated[str, BeforeValidator(_text)]
+Name = Annotated[str, BeforeValidator(_name)]

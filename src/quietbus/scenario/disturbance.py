@@ -9,16 +9,17 @@ from pydantic import BeforeValidator, Discriminator, Tag, ValidationInfo, model_
 
 from quietbus.scenario.base import (
     Angle,
+    Count,
     Frequency,
     Part,
     PositiveAngularVelocity,
     PositiveNumber,
     Series,
     Text,
-    UnitCount,
     listing,
 )
 from quietbus.scenario.errors import Findings, ScenarioError
+from quietbus.scenario.limits import MOST_HARMONICS, MOST_LINES_A_TURN
 from quietbus.scenario.units import Quantity, expected
 from quietbus.scenario.wheel_files import read_wheel_table
 
@@ -41,8 +42,8 @@ RippleTorque = Annotated[float, Quantity("a torque", "N*m", least=0.0)]
 
 
 def _seed(value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-        raise expected("a whole number of at least 0", value)
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 2**63:
+        raise expected("a whole number from 0 to 2^63 - 1", value)
     return value
 
 
@@ -249,7 +250,7 @@ class Disturbance(Part):
 class Ripple(Part):
     """Torque of a gimbal motor that repeats over a turn of the gimbal."""
 
-    per_turn: UnitCount
+    per_turn: Annotated[int, Count(MOST_LINES_A_TURN)]
     torque: RippleTorque  # amplitude
     phase: Angle = 0.0  # against per_turn times gimbal angle
 
@@ -257,10 +258,10 @@ class Ripple(Part):
 class Stepping(Part):
     """A motor that turns the gimbal in steps, which the gimbal follows as an oscillator."""
 
-    steps_per_turn: UnitCount  # of the gimbal, gear included
+    steps_per_turn: Annotated[int, Count(MOST_LINES_A_TURN)]  # of the gimbal, gear included
     frequency: Frequency  # of the oscillation about a step
     damping: PositiveNumber  # over critical damping
-    harmonics: UnitCount = 5  # of the stepping frequency that are taken along
+    harmonics: Annotated[int, Count(MOST_HARMONICS)] = 5  # of the stepping frequency that are taken along
 
 
 class GimbalMotor(Part):

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
-from quietbus.scenario.units import shown
+from quietbus.words import shown, visible, visible_lines
 
 Path = tuple[str | int, ...]
 
@@ -30,10 +30,11 @@ class Problem:
     line: int | None = None
 
     def __str__(self) -> str:
-        where = dotted(self.path)
+        where = visible(dotted(self.path))
         if self.line is not None:
             where = f"{where} (line {self.line})" if where else f"line {self.line}"
-        return f"{where}: {self.message}" if where else self.message
+        message = visible_lines(self.message)
+        return f"{where}: {message}" if where else message
 
 
 class ScenarioError(ValueError):
@@ -47,7 +48,7 @@ class ScenarioError(ValueError):
     def __init__(self, source: str, problems: Iterable[Problem]) -> None:
         self.source = source
         self.problems = tuple(problems)
-        super().__init__("\n".join(f"{source}: {problem}" for problem in self.problems))
+        super().__init__("\n".join(f"{visible(source)}: {problem}" for problem in self.problems))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.source, self.problems)  # an exception's own way keeps one text
@@ -76,9 +77,9 @@ class UnknownKey:
 
     def __init__(self, key: str, known: Iterable[str]) -> None:
         known = list(known)
-        close = difflib.get_close_matches(key, known, n=1)
+        close = difflib.get_close_matches(key[:60], known, n=1)
         hint = f"did you mean '{close[0]}'?" if close else f"known here: {', '.join(known)}"
-        self.message = f"unknown key '{key}'; {hint}"
+        self.message = f"unknown key {shown(key)}; {hint}"
 
 
 def found(
@@ -102,13 +103,13 @@ def _message(details: ErrorDetails) -> str:
             return value.message
         case "literal_error":
             return f"expected {details['ctx']['expected']}, got {shown(value)}"
-        case "string_type":
-            return f"expected a text, got {shown(value)}"
+        case "bool_type":
+            return f"expected true or false, got {shown(value)}"
         case _:
-            return f"{details['msg']}, got {shown(value)}"
+            return f"is not valid, got {shown(value)}"
 
 
 def dotted(path: Path) -> str:
     """A path as text: ``cluster.units[2].position``."""
-    text = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path)
+    text = "".join(f"[{key}]" if isinstance(key, int) else f".{str(key)[:60]}" for key in path)
     return text.removeprefix(".")

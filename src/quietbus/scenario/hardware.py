@@ -40,6 +40,7 @@ from quietbus.scenario.base import (
 from quietbus.scenario.checks import free_directions, inertia_defect, listed
 from quietbus.scenario.disturbance import Disturbance, GimbalMotor
 from quietbus.scenario.errors import Findings
+from quietbus.scenario.limits import MOST_LEGS, MOST_UNITS
 from quietbus.scenario.run_up import RunUp
 
 
@@ -103,6 +104,8 @@ class Legs(Part):
         findings = Findings()
         if self.count < 3:
             findings.add("upper_joints", f"expected at least 3 legs, got {self.count}")
+        if self.count > MOST_LEGS:
+            findings.add("upper_joints", f"expected at most {MOST_LEGS} legs, got {self.count}")
         for key in type(self).model_fields:
             value = getattr(self, key)
             if isinstance(value, tuple) and len(value) != self.count:
@@ -384,6 +387,8 @@ class Placed(Part):
     def _check(self) -> Self:
         findings = Findings()
         units = getattr(self, "units", None)
+        if units is not None and len(units) > MOST_UNITS:
+            findings.add("units", f"expected at most {MOST_UNITS:,} units, got {len(units):,}")
         if (self.pyramid is None) == (units is None):
             got = "neither" if units is None else "both"
             findings.add((), f"expected exactly one of pyramid and units, got {got}")

@@ -7,10 +7,13 @@ import os
 import pathlib
 from dataclasses import replace
 from importlib.resources import files
+from typing import Any
 
 from quietbus.scenario.errors import Problem, ScenarioError
+from quietbus.scenario.files import NO_SUCH_FILE, UnreadableError, read_text
 from quietbus.scenario.schema import Scenario
 from quietbus.scenario.text import read_yaml
+from quietbus.words import shown
 
 _BUILTIN = files("quietbus.scenario") / "builtin"
 
@@ -35,32 +38,40 @@ def load_scenario(path_or_name: str | os.PathLike[str]) -> Scenario:
     """Scenario from a YAML file, or a built-in one by its name.
 
     A built-in's name wins over a file of that name; write ``./name`` for the file. Raises
-    ScenarioError, also if the file cannot be read.
+    ScenarioError, also if the file cannot be read, and TypeError for what is no path.
     """
-    source = os.fspath(path_or_name)
+    source = _source(path_or_name)
     return Scenario.from_yaml(_text(source), source, str(pathlib.Path(source).parent))
 
 
 def located(error: ScenarioError, path_or_name: str | os.PathLike[str]) -> ScenarioError:
     """What is wrong with a scenario that was read from here, with file and lines."""
-    source = os.fspath(path_or_name)
+    source = _source(path_or_name)
     line_of = read_yaml(_text(source), source)[1]
     problems = (replace(each, line=line_of(each.path)) for each in error.problems)
     return ScenarioError(source, problems)
+
+
+def _source(path_or_name: Any) -> str:
+    if not isinstance(path_or_name, str | os.PathLike):
+        raise TypeError(
+            "scenario: expected a Scenario, the path of a scenario file, or a built-in's name, "
+            f"got {shown(path_or_name)}"
+        )
+    source = os.fspath(path_or_name)
+    return source if isinstance(source, str) else os.fsdecode(source)
 
 
 def _text(source: str) -> str:
     if source in builtin_names():
         return builtin_text(source)
     try:
-        return pathlib.Path(source).read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise ScenarioError(source, [Problem(_not_found(source))]) from None
-    except UnicodeDecodeError as error:
-        raise ScenarioError(source, [Problem(f"not a UTF-8 text file: {error}")]) from None
-    except (OSError, ValueError) as error:  # ValueError: a null character in the name
-        why = getattr(error, "strerror", None) or str(error)
-        raise ScenarioError(source, [Problem(f"cannot be read: {why}")]) from None
+        return read_text(source)
+    except UnreadableError as error:
+        missing = error.args[0] == NO_SUCH_FILE
+        raise ScenarioError(
+            source, [Problem(_not_found(source) if missing else str(error))]
+        ) from None
 
 
 def _not_found(source: str) -> str:

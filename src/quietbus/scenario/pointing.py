@@ -12,12 +12,15 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Tag, model_
 from quietbus.scenario.base import (
     Duration,
     Frequency,
+    FrozenDict,
     Number,
     Part,
     StartTime,
     Text,
     UnitVector,
+    bad_name,
     listing,
+    name_defect,
 )
 from quietbus.scenario.errors import Findings
 from quietbus.scenario.units import Quantity, expected, whole_number
@@ -80,12 +83,20 @@ class LineOfSight(Part):
 
 
 def _names(value: Any) -> Any:
-    if not isinstance(value, Mapping) or not all(isinstance(key, str) and key for key in value):
+    if not isinstance(value, Mapping):
         raise expected("a mapping from names to lines of sight", value)
+    findings = Findings()
+    for key in value:
+        defect = name_defect(key)
+        if defect is not None:
+            findings.add(str(key), bad_name(key, defect).message())
+    findings.raise_any()
     return dict(value)
 
 
-LinesOfSight = Annotated[dict[str, LineOfSight], BeforeValidator(_names)]
+LinesOfSight = Annotated[
+    dict[str, LineOfSight], BeforeValidator(_names), AfterValidator(FrozenDict)
+]
 
 
 def _below_one(value: float) -> float:
@@ -204,8 +215,9 @@ def _read(value: Any) -> Any:
     if not isinstance(value, dict):
         raise expected(f"a mapping with the key metric, or a text like {EXAMPLE!r}", value)
     findings = Findings()
-    if value.get("metric") not in _FORMS:
-        error = expected(f"one of {', '.join(sorted(_FORMS, key=str.lower))}", value.get("metric"))
+    metric = value.get("metric")
+    if not isinstance(metric, str) or metric not in _FORMS:
+        error = expected(f"one of {', '.join(sorted(_FORMS, key=str.lower))}", metric)
         findings.add("metric", error.message())
     findings.raise_any()
     return value

@@ -9,19 +9,19 @@ from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import BeforeValidator, Field, ValidationError, model_validator
+from pydantic import BeforeValidator, ValidationError, model_validator
 
-from quietbus.scenario.base import Duration, Frequency, Part, PositiveNumber, Text, listing
+from quietbus.scenario.base import Duration, Frequency, FrozenDict, Name, Part, PositiveNumber, listing
 from quietbus.scenario.checks import listed
 from quietbus.scenario.control import Control, Initial, Load, NoSteering, PseudoInverse, Target
 from quietbus.scenario.errors import Findings, Path, Problem, ScenarioError, dotted, found
 from quietbus.scenario.hardware import Bus, Cluster, Isolator
+from quietbus.scenario.limits import MOST_SAMPLES, Oversize, plain
 from quietbus.scenario.pointing import LinesOfSight, Requirements, unknown_lines
 from quietbus.scenario.text import read_yaml, write_yaml
 from quietbus.scenario.units import expected, whole_number
 from quietbus.scenario.wheels import AnyCluster, WheelCluster, cluster_type
-
-MOST_SAMPLES = 2e7  # of some 400 bytes each
+from quietbus.words import shown
 
 
 class Tolerances(Part):
@@ -77,6 +77,8 @@ def _yaml_text(data: str) -> str:
 
 def _keys(path: str) -> list[str | int]:
     """A dotted path as keys and indices."""
+    if not isinstance(path, str):
+        raise TypeError(f"path: expected a text such as 'bus.mass', got {shown(path)}")
     parts = re.findall(r"[^.\[\]]+", path) or [""]
     return [int(key) if whole_number(key) else key for key in parts]
 
@@ -95,7 +97,7 @@ class Scenario(Part):
     changed copy.
     """
 
-    name: Text
+    name: Name
     bus: Bus
     isolator: Isolator
     cluster: AnyCluster
@@ -103,7 +105,7 @@ class Scenario(Part):
     initial: Initial = Initial()
     target: Target = Target()
     loads: Annotated[tuple[Load, ...], listing(None, "loads", least=0)] = ()
-    lines_of_sight: LinesOfSight = Field(default={})
+    lines_of_sight: LinesOfSight = FrozenDict()
     requirements: Requirements = ()
     simulation: Simulation = Simulation()
 
@@ -147,13 +149,18 @@ class Scenario(Part):
 
         Files that it names are looked for in ``folder``.
         """
+        if not isinstance(text, str):
+            raise TypeError(f"text: expected the YAML text of a scenario, got {shown(text)}")
         data, line_of = read_yaml(text, source)
         return cls._checked(data, source, line_of, folder)
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], source: str = "<data>") -> Self:
         """Scenario from nested dicts and lists as the YAML file has them."""
-        return cls._checked(data, source)
+        try:
+            return cls._checked(plain(data), source)
+        except Oversize as error:
+            raise ScenarioError(source, [Problem(str(error))]) from None
 
     @classmethod
     def _checked(
@@ -185,6 +192,9 @@ class Scenario(Part):
             overrides: values by dotted path, with units if wanted:
                 ``{"isolator.mount": "rigid", "cluster.units[2].rotor.speed": "5900 rpm"}``.
         """
+        if not isinstance(overrides, Mapping):
+            what = "a mapping such as {'isolator.mount': 'rigid'}"
+            raise TypeError(f"overrides: expected {what}, got {shown(overrides)}")
         data = self.to_dict()
         for path, value in overrides.items():
             self._set(data, path, value)

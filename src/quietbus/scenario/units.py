@@ -19,6 +19,8 @@ from typing import TYPE_CHECKING, Any, cast
 from pydantic import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
+from quietbus.words import shown
+
 if TYPE_CHECKING:
     import pint
 
@@ -277,17 +279,3 @@ def expected(what: str, value: Any, why: str = "") -> PydanticCustomError:
     """The error "expected `what`, got `value` (why)"."""
     text = f"expected {what}, got {shown(value)}" + (f" ({why})" if why else "")
     return PydanticCustomError("scenario", "{text}", {"text": text})
-
-
-def shown(value: Any) -> str:
-    """A value as the user wrote it, cut to a readable length."""
-    if value is None:
-        return "nothing"
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, dict):
-        return "a mapping"
-    if isinstance(value, list | tuple) and len(repr(value)) > 60:
-        return f"a list of {len(value)}"
-    text = repr(list(value) if isinstance(value, tuple) else value)
-    return text if len(text) <= 60 else text[:57] + "..."
