@@ -17,8 +17,7 @@ from scipy.signal import get_window
 from quietbus.analysis.waterfall import WINDOWS, ComponentFit, FitError, Waterfall, fit
 from quietbus.scenario import Problem, ScenarioError
 from quietbus.scenario.text import write_yaml
-from quietbus.scenario.units import Quantity
-from quietbus.words import shown
+from quietbus.scenario.units import Quantity, shown
 from quietbus.scenario.wheel_files import KINDS
 from quietbus.scenario.wheel_files.lines import read_cells
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 import reprlib
 from typing import Any
 
-import numpy as np
-
 _LETTERS = 60  # of a value in a message
 
 
 def visible(text: str) -> str:
-    r"""Text with every letter that has no glyph written as its escape: ``\\x1b`` for the escape key.
+    r"""Text with every letter that has no glyph written as its escape, as ``\x1b``.
 
     Control letters move a terminal's cursor or name its window, letters that turn the direction of
     writing make one text look like another.
@@ -31,7 +29,7 @@ def visible_lines(text: str) -> str:
 
 def shown(value: Any) -> str:
     """A value as the user wrote it, cut to a readable length."""
-    if isinstance(value, np.generic | np.ndarray):
+    if _of_numpy(value):
         if value.size > _LETTERS:
             return f"an array of shape {value.shape}"
         value = value.tolist()
@@ -45,6 +43,11 @@ def shown(value: Any) -> str:
     if isinstance(value, list | tuple) and len(text) > _LETTERS:
         return f"a list of {len(value)}"
     return text if len(text) <= _LETTERS else text[: _LETTERS - 3] + "..."
+
+
+def _of_numpy(value: Any) -> bool:
+    """Whether it is an array or a number of NumPy, which is not loaded for this question."""
+    return type(value).__module__ == "numpy" and hasattr(value, "tolist")
 
 
 class _Short(reprlib.Repr):
@@ -64,6 +67,6 @@ class _Short(reprlib.Repr):
         return repr(x)
 
     def repr_instance(self, x: Any, level: int) -> str:
-        if isinstance(x, np.generic | np.ndarray):
+        if _of_numpy(x):
             return self.repr1(x.tolist(), level) if x.size <= _LETTERS else "an array"
         return super().repr_instance(x, level)

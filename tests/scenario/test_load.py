@@ -168,7 +168,7 @@ def test_broken_text(text, message):
             "(did you mean zhang2012?); built in: wheels-demo, zhang2012, zhang2012-slew",
         ),
         ("folder/none.yaml", "folder/none.yaml: no such file"),
-        (".", ".: cannot be read: Is a directory"),
+        (".", ".: is a folder; expected a file"),
         ("a\0b", "cannot be read"),
     ],
 )

@@ -136,7 +136,7 @@ def test_values_do_not_change():
         lambda: scenario.isolator.legs.upper_joints.__setitem__(0, 1),
     )
     for attempt in attempts:
-        with pytest.raises((TypeError, AttributeError), match="do not change|__setitem__"):
+        with pytest.raises((TypeError, AttributeError), match=r"do not change|__setitem__"):
             attempt()
     assert scenario == Scenario.from_dict(scenario.to_dict())
 

@@ -14,6 +14,7 @@ from quietbus.cli.given import Asked
 from quietbus.cli.guard import BAD_INPUT, FAILED, BadInput
 from quietbus.cli.session import on_interrupt
 from quietbus.writing import OutputError
+from quietbus.words import visible_lines
 
 ORDER = [
     *("init", "simulate", "compare", "plot", "report", "analyze", "jitter", "verify"),
@@ -71,5 +72,5 @@ def main() -> None:
         if not isinstance(error, ScenarioError | BadInput):
             raise
         told = Asked.told(error) if isinstance(error, ScenarioError) else error
-        print(f"quietbus: {told}", file=sys.stderr)
+        print(f"quietbus: {visible_lines(str(told))}", file=sys.stderr)
         sys.exit(BAD_INPUT)

@@ -10,6 +10,7 @@ from typing import NoReturn
 import typer
 
 from quietbus.writing import OutputError, check_target
+from quietbus.words import visible_lines
 
 BAD_INPUT, FAILED = 2, 1
 
@@ -19,7 +20,7 @@ class BadInput(Exception):
 
 
 def fail(message: str) -> NoReturn:
-    print(f"quietbus: {message}", file=sys.stderr)
+    print(f"quietbus: {visible_lines(message)}", file=sys.stderr)
     raise typer.Exit(FAILED)
 
 

@@ -40,7 +40,7 @@ class FrozenDict(dict[str, T]):
         raise TypeError(_UNCHANGED)
 
     __setitem__ = __delitem__ = __ior__ = _refuse
-    clear = pop = popitem = setdefault = update = _refuse  # type: ignore[assignment]
+    clear = pop = popitem = setdefault = update = _refuse
 
     def __reduce__(self) -> tuple[Any, ...]:  # a dict's own way sets item after item
         return type(self), (dict(self),)

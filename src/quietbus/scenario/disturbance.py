@@ -19,6 +19,7 @@ from quietbus.scenario.base import (
     listing,
 )
 from quietbus.scenario.errors import Findings, ScenarioError
+from quietbus.scenario.files import TABLE_FOLDERS, within
 from quietbus.scenario.limits import MOST_HARMONICS, MOST_LINES_A_TURN
 from quietbus.scenario.units import Quantity, expected
 from quietbus.scenario.wheel_files import read_wheel_table
@@ -199,7 +200,8 @@ class Disturbance(Part):
     def _read_table(cls, data: Any, info: ValidationInfo) -> Any:
         """Put the orders and resonances of the file, or of several, in the place of the name.
 
-        A relative path starts at the folder of the scenario's file.
+        A relative path starts at the folder of the scenario's file. A scenario may come from
+        anyone, so it may name files there only, unless the user allows other folders.
         """
         if not isinstance(data, dict) or data.get("table") is None:
             return data
@@ -214,6 +216,10 @@ class Disturbance(Part):
             findings.add("table", "expected either table or orders, got both")
         findings.raise_any()
         folder = Path((info.context or {}).get("folder", "."))
+        if not within(folder / name, folder):
+            what = f"a file in the scenario's folder or in those that {TABLE_FOLDERS} names"
+            findings.add("table", expected(what, name).message())
+            findings.raise_any()
         try:
             table = read_wheel_table([folder / name for name in names])
         except ScenarioError as error:
@@ -261,7 +267,7 @@ class Stepping(Part):
     steps_per_turn: Annotated[int, Count(MOST_LINES_A_TURN)]  # of the gimbal, gear included
     frequency: Frequency  # of the oscillation about a step
     damping: PositiveNumber  # over critical damping
-    harmonics: Annotated[int, Count(MOST_HARMONICS)] = 5  # of the stepping frequency that are taken along
+    harmonics: Annotated[int, Count(MOST_HARMONICS)] = 5  # of the stepping frequency, taken along
 
 
 class GimbalMotor(Part):

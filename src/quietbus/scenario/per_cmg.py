@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from quietbus.scenario.errors import Problem, ScenarioError
 from quietbus.scenario.schema import Scenario
@@ -39,6 +38,8 @@ def per_cmg_scenarios(scenario: Scenario, scale: float | None = None) -> list[Sc
     if isinstance(scenario.cluster, WheelCluster):
         said = "expected cmg for platforms that stand one under each CMG, got wheel"
         raise ScenarioError(scenario.name, [Problem(said, ("cluster", "type"))])
+    from scipy.spatial.transform import Rotation  # takes as long to load as all else here
+
     data, n = scenario.to_dict(), scenario.cluster.count
     scale = n**-0.5 if scale is None else scale
     if not (np.isfinite(scale) and scale > 0.0):

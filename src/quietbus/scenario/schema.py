@@ -11,7 +11,15 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import BeforeValidator, ValidationError, model_validator
 
-from quietbus.scenario.base import Duration, Frequency, FrozenDict, Name, Part, PositiveNumber, listing
+from quietbus.scenario.base import (
+    Duration,
+    Frequency,
+    FrozenDict,
+    Name,
+    Part,
+    PositiveNumber,
+    listing,
+)
 from quietbus.scenario.checks import listed
 from quietbus.scenario.control import Control, Initial, Load, NoSteering, PseudoInverse, Target
 from quietbus.scenario.errors import Findings, Path, Problem, ScenarioError, dotted, found

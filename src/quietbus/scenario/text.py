@@ -116,7 +116,7 @@ class _Reader:
             if key not in lines:
                 break
             found = lines[key]
-            data = data[key] if isinstance(data, list) else _by_text(data, key)
+            data = data[int(key)] if isinstance(data, list) else _by_text(data, key)
         return found
 
     def _made(self, node: Node, path: Path) -> tuple[Any, int]:
@@ -131,6 +131,7 @@ class _Reader:
         elif isinstance(node, SequenceNode):
             made = self._sequence(node, path)
         else:
+            assert isinstance(node, MappingNode)
             made = self._mapping(node, path)
         if made[1] > MOST_ENTRIES:
             raise _Refused(

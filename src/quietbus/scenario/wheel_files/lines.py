@@ -12,12 +12,12 @@ from pathlib import Path
 from pydantic_core import PydanticCustomError
 
 from quietbus.scenario.errors import Problem, ScenarioError
+from quietbus.scenario.files import UnreadableError, read_text
 from quietbus.scenario.units import Quantity, shown
 
 Line = tuple[int, str]  # number and text
 COMMENTS = ("#", "//")
 _TOLD = 5  # problems of a file: of a long one all have one cause
-_LARGEST = 20e6  # [bytes] far above any table
 _WITH_COMMA = re.compile(r"([+-]?\d++),(\d++)(?![.,\d])")
 _WITH_POINT = re.compile(r"[+-]?\d*+\.\d")
 
@@ -54,19 +54,9 @@ def read_lines(file: Path) -> list[Line]:
     problems = Problems(file)
     text = ""
     try:
-        if file.exists() and not file.is_file():
-            what = "a folder" if file.is_dir() else "no regular file"
-            problems.add(f"is {what}; expected the file of a table")
-        elif file.stat().st_size > _LARGEST:
-            problems.add(f"expected a table of at most {_LARGEST / 1e6:g} MB, got a larger file")
-        else:
-            text = file.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        problems.add("no such file")
-    except UnicodeDecodeError:
-        problems.add("not a UTF-8 text file")
-    except (OSError, ValueError) as error:
-        problems.add(f"cannot be read: {getattr(error, 'strerror', None) or error}")
+        text = read_text(file)
+    except UnreadableError as error:
+        problems.add(str(error))
     problems.raise_any()
     lines = [(i, line.strip()) for i, line in enumerate(text.splitlines(), 1)]
     lines = [(i, line) for i, line in lines if line]
