@@ -143,7 +143,10 @@ TORQUE = "broadband.radial_torque."
             spectrum(sample_rate=18.0),
             TORQUE + "frequency[1]: expected at most 9 Hz, the Nyquist frequency of the table's",
         ),
-        ({"table": 3}, "cluster.rotor.disturbance.table: expected the name of a file, got 3"),
+        (
+            {"table": 3},
+            "cluster.rotor.disturbance.table: expected the name of a file, or a list of names, got 3",
+        ),
         ({"seed": -1}, "seed: expected a whole number from 0 to 2^63 - 1, got -1"),
     ],
 )

@@ -92,7 +92,9 @@ def test_nested_python_data_are_refused_too(depth):
 
 
 @pytest.mark.parametrize(
-    "value", [10**5000, [[10**5000]], {"a": 1}, 1j, object(), b"x", set()], ids=lambda v: type(v).__name__
+    "value",
+    [10**5000, [[10**5000]], {"a": 1}, 1j, object(), b"x", set()],
+    ids=lambda v: type(v).__name__,
 )
 def test_any_value_is_told_shortly(value):
     with pytest.raises(ScenarioError, match=r"bus\.mass: expected a mass in kg, got") as refused:
@@ -124,10 +126,14 @@ def test_printable_names_are_legal(name):
 # ---- files
 
 
-def refused_table(folder, table):
-    (folder / "s.yaml").write_text(
-        TEXT.replace("    # installation_error", f"    disturbance: {{table: {table}}}\n    #", 1)
+def naming(table):
+    return TEXT.replace(
+        "    # installation_error", f"    disturbance: {{table: {table}}}\n    #", 1
     )
+
+
+def refused_table(folder, table):
+    (folder / "s.yaml").write_text(naming(table))
     with pytest.raises(ScenarioError) as refused:
         load_scenario(folder / "s.yaml")
     return str(refused.value)
@@ -139,6 +145,7 @@ def test_pipes_and_devices_are_not_waited_for(tmp_path):
     for name in (tmp_path / "pipe", "/dev/zero", "/dev/null"):
         with pytest.raises(ScenarioError, match="expected a regular file, got a pipe or a device"):
             load_scenario(name)
+    assert "a pipe or a device" in refused_table(tmp_path, "pipe")
 
 
 def test_a_scenario_names_tables_of_its_own_folder_or_of_those_that_the_user_names(
@@ -150,10 +157,16 @@ def test_a_scenario_names_tables_of_its_own_folder_or_of_those_that_the_user_nam
     secret = wheels / "radial_force.csv"
     secret.write_text("order,kind,coefficient,unit\n1,radial_force,1e-8,kg*m\n")
     (home / "link.csv").symlink_to(secret)
+    (home / "diary.txt").write_text("dear diary: nobody shall read this\n1, 2, 3\n")
+    (home / "keys.txt").write_text("-----: s3cret\n")
     for name in ("../wheels/radial_force.csv", str(secret), "link.csv"):
         told = refused_table(home, name)
         assert "expected a file in the scenario's folder or in those that QUIETBUS_TABLE_" in told
+    for name in ("diary.txt", "keys.txt"):
+        told = refused_table(home, name)
+        assert "expected a table: rows of numbers, or a header" in told
+        assert "dear" not in told
+        assert "s3cret" not in told
     monkeypatch.setenv("QUIETBUS_TABLE_FOLDERS", str(wheels))
-    text = (home / "s.yaml").read_text()
-    scenario = Scenario.from_yaml(text, "s.yaml", str(home))
+    scenario = Scenario.from_yaml(naming("../wheels/radial_force.csv"), "s.yaml", str(home))
     assert scenario.cluster.rotor.disturbance.orders[0].radial_force == 1e-8

@@ -143,7 +143,7 @@ def test_s2es_tables_are_sorted_and_cut_as_its_ini_says(put):
     ("text", "message"),
     [
         ("", "expected a table, got an empty file"),
-        ("# only\n", "an empty file|expected the file's name"),
+        ("# only\n", "expected a table: rows of numbers"),
         ("order,kind,coefficient,unit\n", "expected rows below the header, got none"),
         ("order,coefficient,unit\n1,1,N\n", "line 1: expected a column 'kind'"),
         ("order,kind,coefficient,size\n1,radial_force,1,2\n", "unknown column 'size'"),

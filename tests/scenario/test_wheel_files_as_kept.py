@@ -173,7 +173,7 @@ def test_42_with_decimal_commas_and_tabs(put):
         ("w.ini", INI.replace("SETTINGS/tables", "/etc/").replace("SETTINGS", "../.."),
          "no such file"),
         ("radial_force_radial_torque.csv", "1,1\n", "expected the file's name to say its kind"),
-        ("radial_force.csv", "// nothing but words\n", "expected rows of order and coeff"),
+        ("radial_force.csv", "// nothing but words\n", "expected a table: rows of numbers"),
         ("radial_force.csv", "1" * 200_000 + ";1\n", "not a finite number|cannot be parted"),
     ],
 )  # fmt: skip

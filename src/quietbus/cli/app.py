@@ -13,8 +13,8 @@ from typer.core import TyperGroup
 from quietbus.cli.given import Asked
 from quietbus.cli.guard import BAD_INPUT, FAILED, BadInput
 from quietbus.cli.session import on_interrupt
-from quietbus.writing import OutputError
 from quietbus.words import visible_lines
+from quietbus.writing import OutputError
 
 ORDER = [
     *("init", "simulate", "compare", "plot", "report", "analyze", "jitter", "verify"),

@@ -9,8 +9,8 @@ from typing import NoReturn
 
 import typer
 
-from quietbus.writing import OutputError, check_target
 from quietbus.words import visible_lines
+from quietbus.writing import OutputError, check_target
 
 BAD_INPUT, FAILED = 2, 1
 

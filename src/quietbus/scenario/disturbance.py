@@ -215,11 +215,13 @@ class Disturbance(Part):
         if data.get("orders") is not None:
             findings.add("table", "expected either table or orders, got both")
         findings.raise_any()
-        folder = Path((info.context or {}).get("folder", "."))
-        if not within(folder / name, folder):
-            what = f"a file in the scenario's folder or in those that {TABLE_FOLDERS} names"
-            findings.add("table", expected(what, name).message())
-            findings.raise_any()
+        home = (info.context or {}).get("folder")  # None: data of a program, which may name any
+        folder = Path(home or ".")
+        for name in names:
+            if home is not None and not within(folder / name, folder):
+                what = f"a file in the scenario's folder or in those that {TABLE_FOLDERS} names"
+                findings.add("table", expected(what, name).message())
+        findings.raise_any()
         try:
             table = read_wheel_table([folder / name for name in names])
         except ScenarioError as error:

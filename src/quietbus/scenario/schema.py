@@ -155,7 +155,8 @@ class Scenario(Part):
     def from_yaml(cls, text: str, source: str = "<text>", folder: str = ".") -> Self:
         """Scenario from YAML text; ScenarioError lists all problems, with lines of ``source``.
 
-        Files that it names are looked for in ``folder``.
+        Files that it names are looked for in ``folder``, and have to be there or in the folders
+        that the environment variable QUIETBUS_TABLE_FOLDERS lists.
         """
         if not isinstance(text, str):
             raise TypeError(f"text: expected the YAML text of a scenario, got {shown(text)}")
@@ -176,7 +177,7 @@ class Scenario(Part):
         data: Any,
         source: str,
         line_of: Callable[[Path], int | None] | None = None,
-        folder: str = ".",
+        folder: str | None = None,
     ) -> Self:
         try:
             return cls.model_validate(data, context={"folder": folder})

@@ -52,7 +52,7 @@ def read_wheel_table(
             problems = Problems(file)
             problems.add("expected a CSV file beside others; a file of 42 or an ini stands alone")
             problems.raise_any()
-        has_header = _has_header(lines)
+        has_header = _has_header(file, lines)
         found, more = (headed if has_header else s2e).read_table(file, lines, None)
         layouts.add("csv" if has_header else "s2e")
         rows += found
@@ -71,7 +71,7 @@ def _read_one(file: Path, kind: str | None, wheel: str | None) -> WheelTable:
     _refuse_wheel(file, wheel)
     if _first(lines).startswith("<<<"):
         return forty_two.read(file, lines)
-    if _has_header(lines):
+    if _has_header(file, lines):
         rows, notes = headed.read_table(file, lines, kind)
         return WheelTable(str(file), "csv", merged(str(file), rows), {}, notes)
     rows, notes = s2e.read_table(file, lines, kind)
@@ -94,7 +94,19 @@ def _is_ini(file: Path, lines: list[Line]) -> bool:
     return file.suffix.lower() == ".ini" or _first(lines).startswith("[")
 
 
-def _has_header(lines: list[Line]) -> bool:
-    """Whether the first cell that is no comment is a word, as columns are named by."""
-    cell = re.split(r"[;,\s]", _first(lines), maxsplit=1)[0]
-    return _WORD.search(cell) is not None
+def _has_header(file: Path, lines: list[Line]) -> bool:
+    """Whether the first cell that is no comment is a word, as columns are named by.
+
+    A file that begins like no table is refused without a word of what is in it: a scenario from
+    elsewhere may have named a file that is nobody's business.
+    """
+    cells = re.split(r"[;,\s]+", _first(lines).lower())
+    word = _WORD.search(cells[0]) is not None
+    if not (set(cells) & set(headed.COLUMNS) if word else re.search(r"\d", cells[0])):
+        problems = Problems(file)
+        problems.add(
+            "expected a table: rows of numbers, or a header with columns among "
+            f"{', '.join(headed.COLUMNS)}"
+        )
+        problems.raise_any()
+    return word
