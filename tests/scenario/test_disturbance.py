@@ -145,7 +145,7 @@ TORQUE = "broadband.radial_torque."
         ),
         (
             {"table": 3},
-            "cluster.rotor.disturbance.table: expected the name of a file, or a list of names, got 3",
+            "table: expected the name of a file, or a list of names, got 3",
         ),
         ({"seed": -1}, "seed: expected a whole number from 0 to 2^63 - 1, got -1"),
     ],
