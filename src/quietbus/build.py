@@ -219,6 +219,7 @@ def _disturbance(cluster: scenario_hardware.Cluster | WheelCluster) -> Disturban
     shape = (len(each), len(orders), len(CHANNELS))
     coefficient, phase = np.zeros(shape), np.zeros(shape)
     period, damping = np.zeros((2, len(each), 3))
+    place = {order: k for k, order in enumerate(orders)}
     spectra: list[Spectra] = []
     for j, own in enumerate(each):
         spectra.append(_spectra(own))
@@ -228,7 +229,7 @@ def _disturbance(cluster: scenario_hardware.Cluster | WheelCluster) -> Disturban
         generator = np.random.default_rng([own.seed, j])
         drawn = generator.uniform(-np.pi, np.pi, (len(own.orders or ()), len(CHANNELS)))
         for line, any_phase in zip(own.orders or (), drawn, strict=True):
-            k = orders.index(line.order)
+            k = place[line.order]
             for name, channels in _COMPONENTS.items():
                 channel = channels[0] if line.whirl == "forward" else channels[-1]
                 given = line.phase_of(name)

@@ -87,7 +87,7 @@ def test_every_pattern_of_the_source_is_linear(place, pattern):
     [
         r"(?:[^\W\d]+|[*/\s])*",  # exponential
         r"\s*(\w+)\s*\(\s*([^=,()]+?)\s*((?:,[^,=]+=[^,=]+)*)\)\s*<=\s*(.+?)\s*",  # cubic
-        r"\d+\.?\d*x",  # quadratic
+        r"\d+x",  # quadratic, where it is searched for
     ],
 )
 def test_the_search_for_slow_patterns_finds_them(pattern):

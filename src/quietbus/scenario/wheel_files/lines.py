@@ -18,8 +18,8 @@ from quietbus.scenario.units import Quantity, shown
 Line = tuple[int, str]  # number and text
 COMMENTS = ("#", "//")
 _TOLD = 5  # problems of a file: of a long one all have one cause
-_WITH_COMMA = re.compile(r"([+-]?\d++),(\d++)(?![.,\d])")
-_WITH_POINT = re.compile(r"[+-]?\d*+\.\d")
+_WITH_COMMA = re.compile(r"(?<!\d)([+-]?\d++),(\d++)(?![.,\d])")
+_WITH_POINT = re.compile(r"(?<!\d)[+-]?\d*+\.\d")
 
 
 class Problems:
