@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from quietbus.analysis.windows import METRICS
 from quietbus.scenario import LineOfSight, Scenario, ScenarioError, load_scenario
@@ -194,3 +195,19 @@ def test_wrong_lines_of_sight_are_refused(lines, message):
 def test_a_requirement_without_any_line_of_sight():
     said = refusal("requirements: [{metric: APE, line_of_sight: camera, at_most: 1}]\n")
     assert "expected a name under lines_of_sight, got 'camera'" in said
+
+
+@pytest.mark.parametrize("text", ["3 sigma", "3σ", "3-sigma", "3.0 Sigma"])
+def test_a_confidence_in_sigmas_is_the_probability_of_a_normal_variable(text):
+    (requirement,) = read(
+        f"RPE(camera, window = 5 ms, confidence = {text}) <= 1 arcsec"
+    ).requirements
+    assert requirement.confidence == pytest.approx(norm.cdf(3) - norm.cdf(-3), rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    "text", ["sigma", "0 sigma", "-1 sigma", "nan sigma", "9 sigma", "a sigma"]
+)
+def test_sigmas_that_are_none_are_refused(text):
+    with pytest.raises(ScenarioError, match=r"confidence.*expected a number of sigmas above 0"):
+        read(f"RPE(camera, window = 5 ms, confidence = {text}) <= 1 arcsec")

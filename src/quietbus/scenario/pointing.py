@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
@@ -25,6 +26,7 @@ from quietbus.scenario.base import (
 from quietbus.scenario.errors import Findings
 from quietbus.scenario.units import Quantity, expected, whole_number
 
+MOST_SIGMAS = 8.0  # beyond it the probability is 1 to the last digit
 COLUMNS = 12  # turn and displacement of the bus, then those of the plate relative to the bus
 
 
@@ -105,8 +107,26 @@ def _below_one(value: float) -> float:
     return value
 
 
+def _of_sigmas(value: Any) -> Any:
+    """``3 sigma`` as the probability that a normal variable is within three deviations."""
+    text = value.strip() if isinstance(value, str) else ""
+    word = next((word for word in ("sigma", "σ") if text.lower().endswith(word)), None)
+    if word is None:
+        return value
+    try:
+        count = float(text[: -len(word)].rstrip(" -*"))
+    except ValueError:
+        count = math.nan
+    if not 0.0 < count <= MOST_SIGMAS:
+        raise expected(f"a number of sigmas above 0 and up to {MOST_SIGMAS:g}", value)
+    return math.erf(count / math.sqrt(2.0))
+
+
 Confidence = Annotated[
-    float, Quantity("a confidence level between 0 and 1", "", above=0.0), AfterValidator(_below_one)
+    float,
+    Quantity("a confidence level between 0 and 1", "", above=0.0),
+    AfterValidator(_below_one),
+    BeforeValidator(_of_sigmas),
 ]
 AngleLimit = Annotated[float, Quantity("an angle", "rad", above=0.0)]
 LossLimit = Annotated[float, Quantity("a plain number", "", above=0.0)]
