@@ -3,10 +3,13 @@
 import pytest
 
 from quietbus.reproduce.claims import RULES, Claim
+from quietbus.reproduce.pages import counts
 
 
 def claim(printed="0.036", **more):
-    return Claim("ours", "eq. 1", "a coefficient", printed, "", "since {ours:.3g}", **more)
+    return Claim(
+        "ours", "eq. 1", "a coefficient", printed, "", "since {ours:.3g}", "derived", **more
+    )
 
 
 @pytest.mark.parametrize(
@@ -54,3 +57,29 @@ def test_a_row_tells_difference_and_reason_or_that_nothing_was_computed():
     empty = claim().row({})
     assert (empty["ours"], empty["verdict"]) == (None, "not computed")
     assert {"reproduced", "not computed", row["verdict"]} <= set(RULES)
+
+
+def test_an_equation_is_judged_by_what_it_gives_not_by_a_printed_number():
+    of = claim("", given="theirs", error="broken")
+    row = of.row({"ours": 1e-17, "theirs": 0.021, "broken": 1.0})
+    assert (row["published"], row["ours"]) == (0.021, 1e-17)
+    assert row["printed"] == "0.021"
+    assert row["verdict"] == "paper in error"
+    same = of.row({"ours": 0.021, "theirs": 0.021, "broken": 0.0})
+    assert same["verdict"] == "within rounding"
+    assert of.row({"ours": 1.0})["verdict"] == "not computed"
+
+
+def test_inputs_and_repeated_numbers_are_counted_apart():
+    claims = (
+        Claim("mass", "eq. 1", "mass", "82.8", "kg", "", "input"),
+        Claim("a", "eq. 1", "a", "1", "", "", "derived"),
+        Claim("b", "eq. 1", "b", "2", "", "", "derived", "a"),
+        Claim("c", "eq. 1", "c", "5", "", "", "simulated"),
+    )
+    rows = [each.row({"mass": 82.8, "a": 1.0, "b": 2.0, "c": 7.0}) for each in claims]
+    text = counts(rows)
+    assert "4 rows. 1 of them" in text
+    assert "| input | 1 | 0 | 1 |" in text
+    assert "| derived | 1 | 0 | 1 |" in text
+    assert "| simulated | 0 | 1 | 1 |" in text

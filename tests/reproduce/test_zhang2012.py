@@ -12,9 +12,10 @@ from scipy.optimize import minimize_scalar
 
 from quietbus import api
 from quietbus.reproduce import load_paper
+from quietbus.reproduce.zhang2012 import claims, flights, missing
 from quietbus.reproduce.zhang2012 import control as loop_figures
-from quietbus.reproduce.zhang2012 import flights, missing
 from quietbus.reproduce.zhang2012.bench import Envelope, jitter_of_flight, jitter_peak
+from quietbus.reproduce.zhang2012.sliding import Sliding
 
 A, B, D = 2.0, math.sqrt(2.0) / 4.0, 0.25  # hexapod stiffness over k, docs/analysis.md
 MASS, INERTIA, STIFFNESS, DAMPING = 82.8, 8.8, 20e3, 500.0
@@ -113,6 +114,29 @@ def test_the_papers_universal_joint_turns_where_it_cannot(bench):
     assert found["joint_violation"] < 1e-15
 
 
+def test_a_sliding_leg_needs_the_moment_that_eq_22_lacks():
+    """A mass at r(t) = (a + b t) s(t), s turning at w: m r x d2r/dt2 = 2 m a b w for w across s."""
+    s, w = np.array([0.0, 0.6, 0.8]), np.array([0.3, 0.0, 0.0])
+    leg = Sliding(2.0, 0.4, 0.05, s, w)
+    assert leg.coriolis_moment() == pytest.approx(2.0 * 2.0 * 0.4 * 0.05 * w)
+    assert leg.moment_of_path() == pytest.approx(leg.coriolis_moment(), rel=1e-3, abs=1e-12)
+    tilted = Sliding(2.0, 0.4, 0.05, s, np.array([0.3, 0.2, -0.1]))
+    whole = tilted.coriolis_moment() + tilted.printed_moment()
+    assert tilted.moment_of_path() == pytest.approx(whole, rel=1e-3)
+    assert np.linalg.norm(tilted.printed_moment()) > 0.0
+
+
+def test_the_lower_limit_of_the_gain_is_rouths_without_the_platform(bench):
+    """s^3 I + K (s^2 + (tp + tq) s + tp tq): stable for K > I tp tq/(tp + tq)."""
+    found = loop_figures.locus(bench).numbers
+    expected = 1100.0 * 0.079 * 5e-4 / 0.0795
+    assert found["gain_low_alone"] == pytest.approx(expected, rel=1e-6)
+    for factor, stable in ((1.001, True), (0.999, False)):
+        K = factor * expected
+        roots = np.roots([1100.0, K, K * 0.0795, K * 0.079 * 5e-4])
+        assert bool(np.all(roots.real < 0.0)) == stable
+
+
 def test_peak_of_the_jitter_is_that_of_the_sum_of_all_lines():
     rng = np.random.default_rng(1)
     lines = rng.normal(size=(5, 4, 2, 3)) + 1j * rng.normal(size=(5, 4, 2, 3))
@@ -154,10 +178,12 @@ def test_every_claim_is_told_apart_and_says_where_it_stands_and_why():
     paper = load_paper("zhang2012")
     names = Counter(claim.name for claim in paper.claims)
     assert max(names.values()) == 1
+    titles = (claims.ISOLATION, claims.INFLUENCE, claims.SIMULATIONS, claims.CONCLUSIONS)
     for claim in paper.claims:
-        assert claim.place.startswith(("section", "eq.", "fig."))
-        assert math.isfinite(claim.published)
+        assert claim.place.startswith(("eq.", "fig.", *titles))
+        assert claim.given or math.isfinite(claim.published)
         assert claim.why
+        assert claim.repeats is None or names[claim.repeats] == 1
     files = Counter(part.name for part in paper.parts)
     assert max(files.values()) == 1
     wanted = ("01b", "04", "06", "07", "08", "09", "10", "11", "12")

@@ -13,6 +13,7 @@ from quietbus.reproduce.zhang2012 import (
     missing,
     per_cmg,
     sensitivity,
+    sliding,
 )
 from quietbus.reproduce.zhang2012.bench import Bench
 from quietbus.reproduce.zhang2012.claims import CLAIMS
@@ -40,6 +41,7 @@ PAPER = Paper(
         ),
         "What the paper misses": (
             Part("universal-joint", "A universal joint on a turning base", missing.universal_joint),
+            Part("sliding", "A leg that slides while it turns", sliding.sliding_leg),
             Part("margins", "Margins fall as the platform rises", missing.margins_by_height),
             Part("corner", "A corner frequency that is a peak", missing.corner),
             Part("neglected", "Fixed base, light legs, still rotors", missing.neglected),

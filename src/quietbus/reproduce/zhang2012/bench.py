@@ -20,7 +20,14 @@ MOUNTS: tuple[api.Mount, ...] = ("rigid", "isolated")
 Runs = dict[api.Mount, xr.Dataset]
 OUTPUT_RATE = 500.0  # [Hz] five samples a turn, enough for the peak between samples
 HARMONIC_RATE = 20.0  # [Hz]
-KEPT = ("bus_rate", "bus_attitude", "attitude_error", "gimbal_angle", "singularity_measure")
+KEPT = (
+    "bus_rate",
+    "bus_attitude",
+    "attitude_error",
+    "gimbal_angle",
+    "leg_stroke",
+    "singularity_measure",
+)
 ORDERS = np.array([1.0, 2.0])
 TURN = np.linspace(0.0, 2.0 * np.pi, 256, endpoint=False)  # [rad] of the first order
 

@@ -15,6 +15,9 @@ from quietbus.reproduce.paper import Findings
 from quietbus.reproduce.zhang2012.bench import Bench
 
 DAMPING_RATIOS = (0.1, 0.5, 1.0)
+SATELLITE_INERTIA = 1100.0  # [kg m^2] about x, as printed
+ZEROS = (0.079, 5e-4)  # [rad/s] t_p and t_q, as printed
+CONTROLLER = PID.from_gain_and_zeros(2500.0, ZEROS)
 CRITICAL: dict[str, Any] = {"color": "black", "marker": "+", "markersize": 9, "linestyle": ""}
 
 
@@ -64,14 +67,15 @@ def _x_loop(bench: Bench) -> tuple[Loop, LoopAnalysis]:
 def _printed_loop(bench: Bench) -> Loop:
     legs = bench.study.scenario.isolator.legs
     k, c = float(np.mean(legs.stiffness)), float(np.mean(legs.damping))
-    pid = PID.from_gain_and_zeros(2500.0, (0.079, 5e-4))
-    return attitude_loop(*printed_channel(k, c), 1100.0, pid)
+    return attitude_loop(*printed_channel(k, c), SATELLITE_INERTIA, CONTROLLER)
 
 
 def locus(bench: Bench) -> Findings:
     """Figure 6."""
     loop, found = _x_loop(bench)
     printed = analyze_loop(_printed_loop(bench)).stable_gain_range
+    alone = analyze_loop(attitude_loop([1.0], [1.0], SATELLITE_INERTIA, CONTROLLER))
+    ((least, _),) = alone.stable_gain_range
     ((low, high),) = found.stable_gain_range
     figure = new_figure(3.9, "Root locus, rotation about x")
     whole, near = figure.subplots(1, 2)
@@ -93,6 +97,9 @@ def locus(bench: Bench) -> Findings:
     numbers = {
         "gain_low": low,
         "gain_high": float(high or np.inf),
+        "gain_low_alone": least,
+        "conditional_alone": float(least > 0.0),
+        "routh": SATELLITE_INERTIA * ZEROS[0] * ZEROS[1] / sum(ZEROS),
         "printed_gain_low": printed[0][0],
         "printed_gain_high": float(printed[0][1] or np.inf),
         "channel_zeros": float(len(np.roots(channel.numerator))),
@@ -105,7 +112,8 @@ def locus(bench: Bench) -> Findings:
         f"{numbers['gain_high']:.0f}; with the coefficients as printed "
         f"{numbers['printed_gain_low']:.3f} < K < {numbers['printed_gain_high']:.0f}. The upper "
         "limit is set by the first rocking mode, the lower one by the integrator: the loop is "
-        "conditionally stable."
+        "conditionally stable. The paper calls the platform the cause; the lower limit is there "
+        f"without it too, {least:.4f} (Routh: I t_p t_q/(t_p + t_q) = {numbers['routh']:.4f})."
     )
     return Findings(figure, caption, numbers)
 
@@ -145,15 +153,14 @@ def _coefficients(bench: Bench) -> dict[str, float]:
 
 def _masses(bench: Bench) -> dict[str, float]:
     mass, _, inertia = platform_inertia(bench.study.satellite, bench.study.gimbal_angle)
-    pid = PID.from_gain_and_zeros(2500.0, (0.079, 5e-4))
     return {
         "platform_mass": mass,
         "platform_inertia_x": inertia[0, 0],
         "platform_inertia_y": inertia[1, 1],
         "platform_inertia_z": inertia[2, 2],
-        "kp": pid.kp,
-        "ki": pid.ki,
-        "kd": pid.kd,
+        "kp": CONTROLLER.kp,
+        "ki": CONTROLLER.ki,
+        "kd": CONTROLLER.kd,
     }
 
 

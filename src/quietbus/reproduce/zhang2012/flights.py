@@ -50,6 +50,7 @@ def _imbalance(bench: Bench) -> dict[str, float]:
     cluster = bench.study.satellite.cluster
     static = float((cluster.rotor_mass * cluster.eccentricity)[0])  # [kg m]
     dynamic = float(np.linalg.norm(np.asarray(cluster.I_RRcm_R)[0, 0, 1:]))  # [kg m^2]
+    inertia = np.diag(np.asarray(cluster.I_RRcm_R)[0])
     speed = float(cluster.rotor_speed[0])
     refused = {}
     for kind in ("static", "dynamic"):
@@ -65,6 +66,8 @@ def _imbalance(bench: Bench) -> dict[str, float]:
         "dynamic_unit_refused": refused["dynamic"],
         "imbalance_force": static * speed**2,
         "imbalance_torque": dynamic * speed**2,
+        "imbalance_offset": 1e6 * float(cluster.eccentricity[0]),  # [µm]
+        "imbalance_tilt": 1e6 * dynamic / abs(float(inertia[0] - inertia[1])),  # [µrad]
     }
 
 
