@@ -13,7 +13,7 @@ import quietbus as qb
 from quietbus import cli
 from quietbus.results import JOINT_VARIABLES, ROTOR_VARIABLES, VARIABLES, Summary
 from quietbus.scenario import builtin_names
-from quietbus.scenario.base import Part, UnitCount
+from quietbus.scenario.base import Count, Part
 from quietbus.scenario.control import LAWS
 from quietbus.scenario.hardware import Unit
 from quietbus.scenario.units import Quantity
@@ -186,7 +186,8 @@ def _keys(model: type[Part], prefix: str = ""):
     hints = typing.get_type_hints(model, include_extras=True)
     for name, field in model.model_fields.items():
         parts, units, listed = _contents(hints[name])
-        unit = units[0] or "-" if units else "-" if hints[name] in _COUNTS else ""
+        count = any(isinstance(each, Count) for each in getattr(hints[name], "__metadata__", ()))
+        unit = units[0] or "-" if units else "-" if count else ""
         default = "required" if field.is_required() else field.default
         key = prefix + name
         if model in (Unit, Wheel):
@@ -196,9 +197,6 @@ def _keys(model: type[Part], prefix: str = ""):
         for part in parts:
             below = f"{key}[]." if listed else f"{key}.NAME." if named else f"{key}."
             yield from _keys(part, below)
-
-
-_COUNTS = {UnitCount}  # whole numbers
 
 
 def _contents(annotation):
