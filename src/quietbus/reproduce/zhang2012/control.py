@@ -10,7 +10,7 @@ from quietbus.analysis.isolator import transmissibility, transmissibility_peak
 from quietbus.analysis.loop import PID, Loop, LoopAnalysis, analyze_loop, attitude_loop
 from quietbus.analysis.loop_response import frequency_response, root_locus
 from quietbus.dynamics.linearize import platform_inertia
-from quietbus.plots.style import COLOURS, DASHES, new_figure
+from quietbus.plots.style import COLOURS, DASHES, new_figure, share_legend
 from quietbus.reproduce.paper import Findings
 from quietbus.reproduce.zhang2012.bench import Bench
 
@@ -18,6 +18,7 @@ DAMPING_RATIOS = (0.1, 0.5, 1.0)
 SATELLITE_INERTIA = 1100.0  # [kg m^2] about x, as printed
 ZEROS = (0.079, 5e-4)  # [rad/s] t_p and t_q, as printed
 CONTROLLER = PID.from_gain_and_zeros(2500.0, ZEROS)
+RIM = 0.93  # radius at which the compressed plot has the curve's infinity, the arc's is 1
 CRITICAL: dict[str, Any] = {"color": "black", "marker": "+", "markersize": 9, "linestyle": ""}
 
 
@@ -131,6 +132,13 @@ def _roots(axes: Axes, roots: np.ndarray, marker: str, colour: str, label: str) 
     )
 
 
+def _arrow(axes: Axes, path: np.ndarray, at: int, colour: str) -> None:
+    """The direction of a complex path at one of its points."""
+    ends = [(float(value.real), float(value.imag)) for value in path[[at, at + 1]]]
+    look = {"arrowstyle": "-|>", "color": colour, "mutation_scale": 12, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", ends[1], ends[0], arrowprops=look)
+
+
 def _coefficients(bench: Bench) -> dict[str, float]:
     """Coefficients of eq. 31 and 33 by power of s, with k and c as symbols."""
     x, z = bench.study.channels.x.symbolic, bench.study.channels.z.symbolic
@@ -216,26 +224,55 @@ def nyquist(bench: Bench) -> Findings:
     if counts is None:
         raise RuntimeError("the Nyquist plot passes through -1")
     L = frequency_response(loop, 2.0 * np.pi * np.geomspace(1e-6, 100.0, 6000)).response
-    figure = new_figure(3.9, "Nyquist plot about x, rising frequency, K = 2500")
+    at_zero = int(np.sum(np.abs(loop.poles) < 1e-9))
+    figure = new_figure(4.3, "Nyquist plot about x, K = 2500; arrows: rising frequency")
     whole, near = figure.subplots(1, 2)
-    squeezed = L / (1.0 + np.abs(L))
-    whole.plot(squeezed.real, squeezed.imag, color=COLOURS[0])
-    whole.plot([-0.5], [0.0], **CRITICAL)
-    whole.set(title="radius abs(L)/(1 + abs(L)): rim at infinity", xlim=(-1.05, 1.05))
-    whole.set(ylim=(-1.05, 1.05))
+    squeezed = RIM * L / (1.0 + np.abs(L))
+    # s passes the poles at zero on a small quarter circle, L on a large arc of as many quarters
+    arc = np.exp(-0.5j * np.pi * np.linspace(0.0, at_zero, 200))
+    whole.plot(squeezed.real, squeezed.imag, color=COLOURS[0], label="L(iω), ω > 0")
+    whole.plot(
+        arc.real,
+        arc.imag,
+        color=COLOURS[1],
+        linestyle=DASHES[1],
+        label=f"arc at infinity around {at_zero} poles at zero",
+    )
+    whole.plot([-0.5 * RIM], [0.0], label="-1", **CRITICAL)
+    for path, at in ((arc, 20), (arc, 150), (squeezed, 1500), (squeezed, 4150)):
+        _arrow(whole, path, at, COLOURS[1] if path is arc else COLOURS[0])
+    up = int(np.argmax((L.imag[:-1] > 0.0) & (L.imag[1:] <= 0.0) & (L.real[:-1] < -1.0)))
+    for label, x, at in (("N1", float(squeezed.real[up]), 42), ("N2", -1.0, -42)):
+        whole.annotate(
+            f"{label} = {getattr(counts, label):g}",
+            (x, 0.0),
+            (58, at),
+            textcoords="offset points",
+            ha="center",
+            arrowprops={"arrowstyle": "-", "color": "0.3"},
+        )
+    whole.set(title="all of it; distance from 0 as abs(L)/(1 + abs(L))", xlim=(-1.15, 1.15))
+    whole.set(ylim=(-1.15, 1.15), xticks=[], yticks=[])
+    whole.set(xlabel="real part, compressed", ylabel="imaginary part, compressed")
+    whole.axhline(0.0, color="0.85", linewidth=0.7, zorder=0)
     near.plot(L.real, L.imag, color=COLOURS[0])
     near.plot([-1.0], [0.0], **CRITICAL)
+    _arrow(near, L, int(np.argmin(np.abs(L + 0.6j))), COLOURS[0])
     near.set(title="near the critical point -1", xlim=(-1.6, 0.6), ylim=(-1.2, 1.0))
+    near.set(xlabel="real part [-]", ylabel="imaginary part [-]")
     circle = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 200))
-    for axes, size in ((whole, 0.5), (whole, 1.0), (near, 1.0)):
+    for axes, size in ((whole, 0.5 * RIM), (near, 1.0)):
         axes.plot(size * circle.real, size * circle.imag, color="0.7", linewidth=0.7)
-        axes.set(aspect="equal", xlabel="real part", ylabel="imaginary part")
+        axes.set(aspect="equal")
+    share_legend(figure, whole)
     numbers = {f"nyquist_{name}": float(getattr(counts, name)) for name in ("P", "N1", "N2", "N")}
     numbers["nyquist_Z"] = float(counts.Z)
     caption = (
-        f"Figure 8 of the paper. Crossings of the real axis left of -1: {counts.N1:g} positive, "
-        f"{counts.N2:g} negative, so N = {counts.N:g} and Z = {counts.P} - 2 N = {counts.Z:g}; "
-        f"the closed loop has {found.unstable_poles} poles in the right half-plane, found by its "
-        "roots. Grey circle: abs(L) = 1."
+        f"Figure 8 of the paper. Crossings of the real axis left of -1: {counts.N1:g} positive "
+        f"(the phase rises) and {counts.N2:g} negative, on the arc at infinity by which L passes "
+        f"the {at_zero} poles at zero (dashed; drawn outside the curve, since both lie at the "
+        f"rim), so N = {counts.N:g} and Z = {counts.P} - 2 N = {counts.Z:g}; the closed loop has "
+        f"{found.unstable_poles} poles in the right half-plane, found by its roots. Grey circle: "
+        f"abs(L) = 1."
     )
     return Findings(figure, caption, numbers)

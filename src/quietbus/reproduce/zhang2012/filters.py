@@ -54,8 +54,8 @@ def filters(bench: Bench) -> Findings:
     for axes, axis in zip(over_speed, (0, 2), strict=True):
         for (name, label), colour, dashes in zip(MODELS, (6, 0, 1, 2), DASHES, strict=True):
             size = MICRO * _rss(getattr(sweep, name))[:, axis]
-            axes.plot(hz, size, color=COLOURS[colour], linestyle=dashes, label=label)
-        axes.set(xscale="log", yscale="log", xlabel="rotor speed [Hz]")
+            axes.plot(60.0 * hz, size, color=COLOURS[colour], linestyle=dashes, label=label)
+        axes.set(xscale="log", yscale="log", xlabel="rotor speed [rpm]")
         axes.set_title(f"about {'xyz'[axis]}")
     over_speed[0].set_ylabel("bus rate, RSS [10⁻⁶ °/s]")
     share_legend(figure, over_speed[0])
@@ -98,12 +98,19 @@ def filters(bench: Bench) -> Findings:
     momentum.axvline(15.0, color="0.6", linewidth=1.0, linestyle=":")
     momentum.set(xscale="log", xlabel="rotor momentum\n[N m s]")
     for axes in panels:
-        axes.axhspan(1e-3, GOOD, color="0.9", zorder=0)
-        axes.set(yscale="log", ylim=(5e-3, 3.0))
+        axes.axhspan(5e-3, GOOD, color="0.9", zorder=0)
+        axes.set(yscale="log", ylim=(5e-3, 10.0))
         if axes is not panels[0]:
             axes.tick_params(labelleft=False)
     panels[0].set_ylabel("error of the filters,\n6000 rpm [-]")
-    momentum.legend(*panels[0].get_legend_handles_labels(), loc="center right", fontsize=8)
+    panels[1].legend(
+        *panels[0].get_legend_handles_labels(),
+        loc="upper left",
+        ncols=3,
+        fontsize=8,
+        handlelength=1.6,
+        columnspacing=0.8,
+    )
     numbers = _filter_numbers(sweep, own, platform, found, turned, hz)
     return Findings(figure, _filter_caption(numbers), numbers, _filter_text(numbers))
 

@@ -14,13 +14,13 @@ from quietbus.dynamics.kinematics import PlateMotion, leg_motion
 from quietbus.dynamics.linearize import linearize
 from quietbus.model.satellite import Satellite
 from quietbus.model.variants import without_rotation
-from quietbus.plots.style import COLOURS, DASHES, draw_line, new_figure, share_legend
+from quietbus.plots.style import COLOURS, DASHES, MARKERS, draw_line, new_figure, share_legend
 from quietbus.reproduce.paper import Findings
 from quietbus.reproduce.zhang2012.bench import Bench
 from quietbus.reproduce.zhang2012.control import printed_channel
 from quietbus.study import Study
 
-HEIGHTS = np.linspace(-1.2, 2.0, 33)  # [m] of the plate over the bus mass centre
+HEIGHTS = np.union1d(np.linspace(-1.2, 2.0, 33), np.linspace(-0.1, 0.2, 61))  # [m] over the bus
 
 
 def universal_joint(bench: Bench) -> Findings:
@@ -37,7 +37,14 @@ def universal_joint(bench: Bench) -> Findings:
     figure = new_figure(4.6, "The paper's universal joint on a turning base (slew)")
     spin, momentum = figure.subplots(2, 1, sharex=True)
     for i in range(missing.shape[1]):
-        look = {"color": COLOURS[i], "linestyle": DASHES[i % 4], "label": f"leg {i}"}
+        wide = i < 3  # opposite legs coincide: the first three wide and pale below the others
+        look = {
+            "color": COLOURS[i],
+            "linestyle": "-" if wide else DASHES[1],
+            "linewidth": 4.0 if wide else 1.3,
+            "alpha": 0.45 if wide else 1.0,
+            "label": f"leg {i}",
+        }
         draw_line(spin, time, np.degrees(missing[:, i]), **look)
     spin.set_ylabel("leg's spin that\nthe paper misses [°/s]")
     momentum.plot(time, np.linalg.norm(momentum_B, axis=1), color=COLOURS[0])
@@ -156,14 +163,16 @@ def margins_by_height(bench: Bench) -> Findings:
 def corner(bench: Bench) -> Findings:
     """What the paper calls the corner frequency."""
     channels = bench.study.channels
-    figure = new_figure(3.8, 'The "corner frequency" of the torque channels')
-    panels = figure.subplots(1, 2, sharey=True)
+    figure = new_figure(5.6, 'The "corner frequency" of the torque channels')
+    panels, zooms = figure.subplots(2, 2, height_ratios=(1.2, 1.0))
     hz = np.geomspace(0.3, 30.0, 800)
     numbers: dict[str, float] = {}
-    for axes, name, printed in zip(panels, ("x", "z"), (2.46, 4.58), strict=True):
+    for axes, zoom, name, printed in zip(panels, zooms, ("x", "z"), (2.46, 4.58), strict=True):
         channel: Channel = getattr(channels, name)
-        axes.plot(hz, np.abs(channel.response(2.0 * np.pi * hz)), color=COLOURS[0])
-        axes.plot([channel.peak_frequency_hz], [channel.peak_gain], "o", color=COLOURS[1])
+        near = np.linspace(0.93 * printed, 1.14 * printed, 300)
+        for each, at in ((axes, hz), (zoom, near)):
+            each.plot(at, np.abs(channel.response(2.0 * np.pi * at)), color=COLOURS[0])
+            each.plot([channel.peak_frequency_hz], [channel.peak_gain], "o", color=COLOURS[1])
         marks = [("undamped", value, 1) for value in channel.undamped_frequencies_hz]
         marks += [
             ("damped", pole.damped_frequency_hz, 2) for pole in channel.poles if pole.imag > 0.0
@@ -171,10 +180,13 @@ def corner(bench: Bench) -> Findings:
         if channel.minus_3db_frequency_hz is not None:
             marks.append(("-3 dB", channel.minus_3db_frequency_hz, 3))
         for label, value, look in marks:
-            axes.axvline(value, color=COLOURS[look], linestyle=DASHES[look], label=label)
-        axes.axvline(printed, color="black", linewidth=3, alpha=0.25, label="paper")
-        axes.set(xscale="log", yscale="log", xlabel="frequency [Hz]")
+            for each in (axes, zoom):
+                each.axvline(value, color=COLOURS[look], linestyle=DASHES[look], label=label)
+        for each in (axes, zoom):
+            each.axvline(printed, color="black", linewidth=3, alpha=0.25, label="paper")
+        axes.set(xscale="log", yscale="log")
         axes.set_title(f"about {name}: peak {channel.peak_gain:.3f} at the dot")
+        zoom.set(xlim=(near[0], near[-1]), xlabel="frequency [Hz]", title="the same near the peak")
     for name, channel in zip("xyz", channels, strict=True):
         numbers[f"corner_{name}"] = channel.peak_frequency_hz
         numbers[f"corner_{name}_gain"] = channel.peak_gain
@@ -190,7 +202,8 @@ def corner(bench: Bench) -> Findings:
     numbers["printed_corner"] = peak(*as_printed)[0] / (2.0 * np.pi)
     loops = bench.study.loop_analyses
     numbers["decade"] = numbers["corner_x"] / (loops["x"].bandwidth_hz or np.nan) if loops else 0.0
-    panels[0].set_ylabel("torque passed on [-]")
+    for each in (panels[0], zooms[0]):
+        each.set_ylabel("torque passed on [-]")
     handles, labels = panels[1].get_legend_handles_labels()
     known = dict(zip(labels, handles, strict=True))
     figure.legend(known.values(), known.keys(), loc="outside lower center", ncols=5)
@@ -223,12 +236,23 @@ def neglected(bench: Bench) -> Findings:
     figure = new_figure(4.6, "Upper limit of K as simplifications are lifted")
     axes = figure.subplots()
     places = np.arange(len(names))[::-1]
-    colours = [COLOURS[1] if name.startswith("per axis") else COLOURS[0] for name in names]
-    axes.barh(places, limits, color=colours, height=0.65)
+    kinds = {  # label: which rows
+        "each axis alone, as in the paper": [name.startswith("per axis") for name in names],
+        "all axes, with gimbal servo": ["servo" in name for name in names],
+        "all axes, without gimbal servo": [
+            not name.startswith("per axis") and "servo" not in name for name in names
+        ],
+    }
+    for i, (label, chosen) in enumerate(kinds.items()):
+        marked = np.array(chosen)
+        axes.plot(
+            np.array(limits)[marked], places[marked], MARKERS[i], color=COLOURS[i], label=label
+        )
     for place, limit in zip(places, limits, strict=True):
         axes.annotate(
-            f"{limit:.0f}", (limit, place), (4, 0), textcoords="offset points", va="center"
+            f"{limit:.0f}", (limit, place), (7, 0), textcoords="offset points", va="center"
         )
+    share_legend(figure, axes)
     axes.axvline(2500.0, color="0.3", linewidth=1.0, linestyle=":")
     axes.set_yticks(places, names)
     axes.set(xscale="log", xlim=(1e3, 2e5), xlabel="upper limit of K [N m s/rad] (dotted: chosen)")
@@ -262,7 +286,8 @@ def neglected(bench: Bench) -> Findings:
         f"{numbers['effect_leg_mass']:+.2g} %, rotor momentum by "
         f"{numbers['effect_momentum']:+.4f} % at zero gimbal angles, where it cancels, and by "
         f"{numbers['effect_momentum_slew']:+.2g} % at the gimbal angles of the slew's fastest "
-        "instant (satellite at rest)."
+        "instant (satellite at rest). The last two are without the gimbal servo: to be compared "
+        f"with each other and with {momentum:.0f}, not with the servo's row."
     )
     return Findings(figure, caption, numbers, text)
 

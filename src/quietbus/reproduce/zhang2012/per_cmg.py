@@ -1,6 +1,7 @@
 """What else could carry the CMGs: a platform for each instead of one for all."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from quietbus.analysis.platforms import Platforms
 from quietbus.model.satellite import Satellite
 from quietbus.model.variants import without_rotation
 from quietbus.platform_study import PlatformStudy
-from quietbus.plots.style import COLOURS, DASHES, new_figure, share_legend
+from quietbus.plots.style import COLOURS, DASHES, MARKERS, new_figure, share_legend
 from quietbus.reproduce.paper import Findings
 from quietbus.reproduce.zhang2012.bench import Bench
 from quietbus.scenario import Scenario, per_cmg_scenarios
@@ -49,20 +50,26 @@ def per_cmg(bench: Bench) -> Findings:
 
     figure = new_figure(6.2, "One platform for four CMGs, or an isolator for each: the same budget")
     grid = figure.add_gridspec(2, 6, height_ratios=(1.15, 1.0))
-    speed, bars = figure.add_subplot(grid[0, :4]), figure.add_subplot(grid[0, 4:])
+    speed, dots = figure.add_subplot(grid[0, :4]), figure.add_subplot(grid[0, 4:])
     labels = ("no isolator", "one platform", "one isolator per CMG")
     for i, label in enumerate(labels):
         size = MICRO * swept[:, i]
-        speed.plot(SWEEP_HZ, size, color=COLOURS[i], linestyle=DASHES[i], label=label)
-    speed.set(xscale="log", yscale="log", xlabel="rotor speed [Hz]")
+        look: dict[str, Any] = {
+            "color": COLOURS[i],
+            "linestyle": DASHES[i],
+            "marker": MARKERS[i],
+            "markersize": 4,
+        }
+        speed.plot(60.0 * SWEEP_HZ, size, markevery=[-1], label=label, **look)
+    speed.set(xscale="log", yscale="log", xlabel="rotor speed [rpm]")
     speed.set_ylabel("bus rate, worst phases [10⁻⁶ °/s]")
     sizes = [
         s.combined(m).worst_case for s, m in ((one, "rigid"), (one, "isolated"), (four, "isolated"))
     ]
     for i, values in enumerate(sizes):
-        bars.bar(np.arange(3) + 0.27 * (i - 1), MICRO * values, 0.25, color=COLOURS[i])
-    bars.set(yscale="log", ylim=(1.0, None), xlabel="axis, 6000 rpm")
-    bars.set_xticks(range(3), "xyz")
+        dots.plot(range(3), MICRO * values, MARKERS[i], color=COLOURS[i])
+    dots.set(yscale="log", xlim=(-0.5, 2.5), xlabel="about, at 6000 rpm")
+    dots.set_xticks(range(3), "xyz")
     share_legend(figure, speed)
     own = _figures(one)
     titles = ("bus rate, norm\n[10⁻⁶ °/s]", "upper limit of K\n[N m s/rad]", "stroke [mm per N m]")
