@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import reprlib
 from typing import Any
 
@@ -20,6 +21,11 @@ def visible(text: str) -> str:
         else letter.encode("unicode_escape", "surrogatepass").decode("ascii")
         for letter in text
     )
+
+
+def file_name(text: str) -> str:
+    """A name as a part of a file's name: no separator, space or letter that a shell reads."""
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", text) or "-"
 
 
 def visible_lines(text: str) -> str:
@@ -69,4 +75,5 @@ class _Short(reprlib.Repr):
     def repr_instance(self, x: Any, level: int) -> str:
         if _of_numpy(x):
             return self.repr1(x.tolist(), level) if x.size <= _LETTERS else "an array"
-        return super().repr_instance(x, level)
+        text = super().repr_instance(x, level)
+        return f"an object of type {type(x).__name__}" if text.startswith("<") else text

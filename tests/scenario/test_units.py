@@ -132,7 +132,10 @@ def test_angular_fields_demand_an_angle(unit, power):
     assert "turns or radians?" in refusal(Quantity("it", names[power]), f"1 ({unit})^{power}")
 
 
-@given(st.floats(-1e12, 1e12), st.sampled_from([("mm", 1e-3), ("km", 1e3), ("ft", 0.3048)]))
+@given(
+    st.floats(-1e12, 1e12).filter(lambda x: x == 0.0 or abs(x) > 1e-50),
+    st.sampled_from([("mm", 1e-3), ("km", 1e3), ("ft", 0.3048)]),
+)
 def test_unit_scales_the_number(number, unit):
     name, factor = unit
     assert LENGTH.read(f"{number!r} {name}") == pytest.approx(number * factor, rel=1e-15)

@@ -14,6 +14,7 @@ from quietbus.cli.given import OUT, FolderOption, JsonOption
 from quietbus.cli.guard import BadInput, check_file, make_folder
 from quietbus.cli.session import print_table, status
 from quietbus.cli.written import write_study
+from quietbus.words import visible_lines
 from quietbus.writing import write_text
 
 BLOCK = "disturbance block (YAML)"
@@ -51,9 +52,9 @@ def import_(
         raise BadInput("--kind: expected one file with it, whose kind it says")
     table = read_wheel_table(files, kind, wheel)
     for lost in table.lost:
-        print(f"note: not taken over: {lost}", file=sys.stderr)
+        print(f"note: not taken over: {visible_lines(lost)}", file=sys.stderr)
     for note in table.notes:
-        print(f"note: {note}", file=sys.stderr)
+        print(f"note: {visible_lines(note)}", file=sys.stderr)
     _write_block(table.to_yaml(), output)
 
 

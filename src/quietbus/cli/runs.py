@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Annotated
 
@@ -29,6 +28,7 @@ from quietbus.cli.session import (
     progress,
 )
 from quietbus.cli.written import save
+from quietbus.words import file_name
 from quietbus.writing import write_json
 
 RUN = "run (NetCDF-4)"
@@ -61,7 +61,7 @@ def simulate(
     """Simulate a scenario; write the run and print what one wants to know of it."""
     checked = load(scenario, mount, duration, output_rate)
     chosen = checked.isolator.mount
-    name = f"{re.sub(r'[^A-Za-z0-9._-]+', '-', checked.name)[:LONGEST]}-{chosen}"
+    name = f"{file_name(checked.name)[:LONGEST]}-{chosen}"
     output = output or Path(f"{name}-harmonic.nc" if method == Method.harmonic else f"{name}.nc")
     check_file(output, RUN)
     checkpoint = _checkpoint_of(output, resume)

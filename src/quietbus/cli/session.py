@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from quietbus.cli.guard import FAILED
+from quietbus.words import visible_lines
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -66,14 +67,14 @@ def progress(runs: Mapping[str, float]) -> Iterator[Callable[[str, float], None]
     )
 
     columns = (
-        TextColumn("{task.description:>22}"),
+        TextColumn("{task.description:>22}", markup=False),
         BarColumn(),
         TextColumn("{task.completed:g} of {task.total:g} s"),
         TimeElapsedColumn(),
         TextColumn("left"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True)) as bars:
+    with Progress(*columns, console=Console(stderr=True, markup=False, emoji=False)) as bars:
         tasks = {run: bars.add_task(f"{run}: compiling", total=t) for run, t in runs.items()}
 
         def tell(run: str, t: float) -> None:
@@ -90,8 +91,8 @@ def fraction() -> Iterator[Callable[[str, float], None]]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    columns = (TextColumn("{task.description:>40}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True)) as bars:
+    columns = (TextColumn("{task.description:>40}", markup=False), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True, markup=False, emoji=False)) as bars:
         task = bars.add_task("", total=1.0)
 
         def tell(what: str, fraction: float) -> None:
@@ -106,9 +107,10 @@ def fraction() -> Iterator[Callable[[str, float], None]]:
 def status() -> Iterator[Callable[[str], None]]:
     """A line on standard error that says what is being done."""
     from rich.console import Console
+    from rich.text import Text
 
-    with Console(stderr=True).status("") as status:
-        yield lambda text: status.update(text)
+    with Console(stderr=True, markup=False, emoji=False).status("") as status:
+        yield lambda text: status.update(Text(text))
 
 
 @contextmanager
@@ -119,10 +121,10 @@ def notes() -> Iterator[None]:
         yield
     for warning in caught:
         if warning.category.__name__ == "QuietbusWarning":
-            print(f"note: {warning.message}", file=sys.stderr)
+            print(f"note: {visible_lines(str(warning.message))}", file=sys.stderr)
 
 
 def print_table(table: Table) -> None:
     from rich.console import Console
 
-    Console().print(table)
+    Console(markup=False, emoji=False).print(table)

@@ -10,7 +10,7 @@ import numpy as np
 from quietbus.analysis.power import Density, LinePower, cumulative
 from quietbus.analysis.spectrum import detrended
 from quietbus.plots.jitter import log_scale
-from quietbus.plots.style import COLOURS, DASHES, explain, new_figure, share_legend, style
+from quietbus.plots.style import COLOURS, DASHES, explain, literal, new_figure, share_legend, style
 from quietbus.verification import ARCSEC
 
 if TYPE_CHECKING:
@@ -172,5 +172,6 @@ def _exposure(axes: Axes, verdict: Verdict, windows: np.ndarray, values: np.ndar
     unit = "" if verdict.unit == "1" else f" [{verdict.unit}]"
     axes.set_ylabel(f"{metric.name}{unit or ' [-]'}")
     word = "met" if verdict.met else "NOT MET"
-    said = f"{verdict.line_of_sight}: {value:.3g}, {word}, margin {verdict.margin_percent:.3g} %"
+    name, margin = literal(verdict.line_of_sight), verdict.margin_percent
+    said = f"{name}: {value:.3g}, {word}, margin {margin:.3g} %"
     axes.set_title(textwrap.fill(f"{said}; {verdict.meaning}", 46), fontsize=8.5)

@@ -11,12 +11,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from quietbus.words import file_name
 from quietbus.writing import replacing
 
 # Okabe and Ito's colours, told apart by colour-blind readers too, without the pale yellow
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 DASHES = ("-", (0, (5, 1.5)), (0, (6, 1.5, 1, 1.5)), (0, (1.5, 1)))  # told apart in black and white
 WIDTH = 7.5  # [in] of a figure, two columns of a journal
+LINE = 88  # [letters] of a title
 MARKERS = ("o", "s", "^")
 BINS = 1200  # of a long line, one for each dot of its width
 _RC: dict[Any, Any] = {
@@ -46,11 +48,17 @@ def style() -> Iterator[None]:
         yield
 
 
+def literal(text: str) -> str:
+    """Text in which a user's dollar signs are dollar signs, not the bounds of a formula."""
+    return text.replace("$", r"\$")
+
+
 def new_figure(height: float, title: str) -> Figure:
-    """An empty figure of the usual width, ``height`` [in]."""
+    """An empty figure of the usual width, ``height`` [in]; the title's letters mean themselves."""
     figure = Figure(figsize=(WIDTH, height), dpi=150)
     figure.set_layout_engine("constrained", w_pad=0.08, h_pad=0.05)
-    figure.suptitle(title, fontsize=10.5, fontweight="bold", x=0.01, ha="left")
+    title = textwrap.fill(title, LINE, break_on_hyphens=False)
+    figure.suptitle(literal(title), fontsize=10.5, fontweight="bold", x=0.01, ha="left")
     return figure
 
 
@@ -58,6 +66,8 @@ def save_figures(
     figures: dict[str, Figure], directory: str | pathlib.Path, suffix: str = ".png"
 ) -> list[pathlib.Path]:
     """Write figures as ``directory/name.suffix``: PNG at 150 dpi, or SVG or PDF.
+
+    Letters of a name that a file's name should not have become dashes.
 
     Raises:
         ValueError: another suffix.
@@ -67,7 +77,11 @@ def save_figures(
         raise ValueError(f"suffix must be .png, .svg or .pdf; got {suffix!r}")
     folder = pathlib.Path(directory)
     folder.mkdir(parents=True, exist_ok=True)
-    paths = [folder / f"{name}{suffix}" for name in figures]
+    names: dict[str, None] = {}  # of the files, no two alike
+    for name in map(file_name, figures):
+        alike = sum(other.rpartition("~")[0] == name or other == name for other in names)
+        names[f"{name}~{alike + 1}" if alike else name] = None
+    paths = [folder / f"{name}{suffix}" for name in names]
     for path, figure in zip(paths, figures.values(), strict=True):
         with replacing(path, f"{suffix} picture") as file:
             figure.savefig(file, format=suffix[1:])

@@ -26,6 +26,7 @@ except ModuleNotFoundError as missing:
     ) from missing
 from quietbus.results import aliasing, has_gimbals, scenario_of, summarize
 from quietbus.tables import checks_table, summary_table
+from quietbus.words import visible_lines
 from quietbus.writing import check_target, write_text
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ def report_page(run: xr.Dataset, checks: "Sequence[Check] | None" = None) -> str
         name=scenario.name,
         mount=run.attrs["mount"],
         status=run.attrs.get("status", "unknown"),
-        reason=run.attrs.get("stop_reason", ""),
+        reason=visible_lines(run.attrs.get("stop_reason", "")),
         reached=f"{time[-1]:.6g}",
         duration=f"{scenario.simulation.duration:.6g}",
         facts=_facts(run),
@@ -84,7 +85,7 @@ def report_page(run: xr.Dataset, checks: "Sequence[Check] | None" = None) -> str
         buckets=buckets,
         checks=_cells(checks_table(name, checks)) if checks else None,
         failed=[check.name for check in checks or () if not check.passed],
-        scenario=run.attrs["scenario"],
+        scenario=visible_lines(run.attrs["scenario"]),
         provenance=_provenance(run),
         makers=_makers(),
         made=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
@@ -149,7 +150,9 @@ def _provenance(run: xr.Dataset) -> dict[str, str]:
     others = run.attrs.keys() - _ATTRIBUTES.keys() - set(_ELSEWHERE)
     values = known | {name: run.attrs[name] for name in sorted(others)}
     return {
-        name: f"{value:.4g}" if isinstance(value, float | np.floating) else str(value)
+        name: f"{value:.4g}"
+        if isinstance(value, float | np.floating)
+        else visible_lines(str(value))
         for name, value in values.items()
     }
 

@@ -67,6 +67,8 @@ slug = 14.593902937206364 * kilogram
 gravity = 9.80665 * meter / second ** 2 = g0
 """
 
+LARGEST = 1e60  # whose square is still a number, and that of its inverse
+
 # Names of dimensions, to guess what a wrong quantity was meant for.
 _KNOWN = {
     "a mass": "kg",
@@ -212,6 +214,9 @@ class Quantity:
         number = self._number(value)
         if not math.isfinite(number):
             raise self._error(value, "not a finite number")
+        if number != 0.0 and not 1.0 / LARGEST <= abs(number) <= LARGEST:
+            size = "large" if abs(number) > 1.0 else "small"
+            raise self._error(value, f"too {size} to be computed with")
         if self.above is not None and number <= self.above:
             raise self._error(value, f"must be above {self.above:g}")
         if self.least is not None and number < self.least:
