@@ -242,7 +242,7 @@ def _places(data: Any) -> Iterator[tuple[Any, Any]]:
 
 
 def fault(given: str | dict[str, Any], most_s: float = 2.0) -> str | None:
-    """What is wrong with how a text or data are read; None: it is a scenario, or refused at once."""
+    """What is wrong with how a text or data are read, or None: a scenario, or refused."""
     start = time.process_time()
     try:
         # a warning of a library is none that a user could understand

@@ -133,7 +133,7 @@ def test_angular_fields_demand_an_angle(unit, power):
 
 
 @given(
-    st.floats(-1e12, 1e12).filter(lambda x: x == 0.0 or abs(x) > 1e-50),
+    st.floats(-1e12, 1e12),
     st.sampled_from([("mm", 1e-3), ("km", 1e3), ("ft", 0.3048)]),
 )
 def test_unit_scales_the_number(number, unit):

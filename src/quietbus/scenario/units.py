@@ -214,11 +214,12 @@ class Quantity:
         number = self._number(value)
         if not math.isfinite(number):
             raise self._error(value, "not a finite number")
-        if number != 0.0 and not 1.0 / LARGEST <= abs(number) <= LARGEST:
-            size = "large" if abs(number) > 1.0 else "small"
-            raise self._error(value, f"too {size} to be computed with")
+        if abs(number) > LARGEST:
+            raise self._error(value, "too large to be computed with")
         if self.above is not None and number <= self.above:
             raise self._error(value, f"must be above {self.above:g}")
+        if self.above is not None and 0.0 < number < 1.0 / LARGEST:
+            raise self._error(value, "too small to be divided by")
         if self.least is not None and number < self.least:
             raise self._error(value, f"must be at least {self.least:g}")
         return number
