@@ -39,19 +39,23 @@ from quietbus.scenario.wheels import Wheel, WheelCluster
 
 
 def build_satellite(
-    scenario: Scenario, mount: Literal["isolated", "rigid"] | None = None
+    scenario: Scenario,
+    mount: Literal["isolated", "rigid"] | None = None,
+    first_unit: int = 0,
 ) -> Satellite:
     """Parameters of the model.
 
     Args:
         scenario: the checked scenario.
         mount: instead of the scenario's own.
+        first_unit: number of the first unit where the satellite has others, on other platforms:
+            random phases go by it.
     """
     if mount not in (None, "isolated", "rigid"):
         raise ValueError(f"mount must be 'isolated' or 'rigid', got {mount!r}")
     isolator, cluster = scenario.isolator, scenario.cluster
     base = _rotation(isolator.orientation)
-    phases = cluster.rotor_phases or (0.0,) * cluster.count
+    phases = cluster.phases(first_unit)
     placed: tuple[scenario_hardware.Unit | Wheel, ...] = cluster.placed()
     units = [_unit(unit, phase) for unit, phase in zip(placed, phases, strict=True)]
     stacked = jax.tree.map(lambda *each: _array(np.stack(each)), *units)
@@ -72,7 +76,7 @@ def build_satellite(
         steering=_steering(scenario.control),
         loads=tuple(_load(load) for load in scenario.loads),
         mount=mount or isolator.mount,
-        disturbance=_disturbance(cluster),
+        disturbance=_disturbance(cluster, first_unit),
         motor=_gimbal_motor(cluster),
     )
     if scenario.control is None:
@@ -209,7 +213,9 @@ def _unit(unit: scenario_hardware.Unit | Wheel, phase: float) -> ControlMomentGy
     )
 
 
-def _disturbance(cluster: scenario_hardware.Cluster | WheelCluster) -> Disturbance | None:
+def _disturbance(
+    cluster: scenario_hardware.Cluster | WheelCluster, first_unit: int
+) -> Disturbance | None:
     """Of all rotors, at the orders of all tables; None if no rotor has any."""
     placed: tuple[scenario_hardware.Unit | Wheel, ...] = cluster.placed()
     each = [unit.rotor.disturbance if unit.rotor else None for unit in placed]
@@ -225,17 +231,14 @@ def _disturbance(cluster: scenario_hardware.Cluster | WheelCluster) -> Disturban
         spectra.append(_spectra(own))
         if own is None:
             continue
-        # drawn for all lines, whether random or not, so that a phase given changes no other
-        generator = np.random.default_rng([own.seed, j])
-        drawn = generator.uniform(-np.pi, np.pi, (len(own.orders or ()), len(CHANNELS)))
-        for line, any_phase in zip(own.orders or (), drawn, strict=True):
+        phases = own.phases(first_unit + j)
+        for line, given in zip(own.orders or (), phases, strict=True):
             k = place[line.order]
-            for name, channels in _COMPONENTS.items():
-                channel = channels[0] if line.whirl == "forward" else channels[-1]
-                given = line.phase_of(name)
-                coefficient[j, k, channel] += getattr(line, name)
+            for name in scenario_disturbance.COMPONENTS:
                 if getattr(line, name):
-                    phase[j, k, channel] = any_phase[channel] if given == "random" else given
+                    channel = line.channel_of(name)
+                    coefficient[j, k, channel] += getattr(line, name)
+                    phase[j, k, channel] = given[name]
         modes = own.resonances
         for m, mode in enumerate((modes.radial, modes.axial, modes.rocking)):
             if mode is not None:
@@ -251,15 +254,6 @@ def _disturbance(cluster: scenario_hardware.Cluster | WheelCluster) -> Disturban
     )
 
 
-# channels of a component that turns forward and backward, or has one only
-_COMPONENTS = {
-    "radial_force": (0, 1),
-    "axial_force": (2,),
-    "radial_torque": (3, 4),
-    "axial_torque": (5,),
-}
-
-
 def _spectra(disturbance: scenario_disturbance.Disturbance | None) -> Spectra:
     """Spectra of one rotor by component."""
     given = disturbance.broadband.given() if disturbance else {}
@@ -271,7 +265,7 @@ def _spectra(disturbance: scenario_disturbance.Disturbance | None) -> Spectra:
         logarithmic = table.interpolation == "log"
         return Spectrum(_array(table.frequency), _array(table.psd), logarithmic)
 
-    radial, axial, rocking, about = (spectrum(name) for name in _COMPONENTS)
+    radial, axial, rocking, about = (spectrum(name) for name in scenario_disturbance.COMPONENTS)
     return radial, axial, rocking, about
 
 

@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.integrate import trapezoid
 
 from quietbus.analysis.coupled import CoupledAnalysis, analyze_coupled
 from quietbus.analysis.jitter import AT_REST, Combined, combine
@@ -16,6 +17,7 @@ from quietbus.scenario import Problem, Scenario, ScenarioError
 from quietbus.scenario.checks import listed
 from quietbus.scenario.wheels import WheelCluster
 from quietbus.solve.harmonic import refuse_resonance
+from quietbus.solve.noise import frequency_grid
 
 SHARED = ("bus", "control")  # what is the satellite's and not a platform's
 
@@ -25,7 +27,8 @@ class PlatformStudy:
     """Small vibration at rest of one bus with a platform for each of several scenarios.
 
     Each scenario describes the bus with one platform and its CMGs; bus and control must be the
-    same in all. The control steers all CMGs as one cluster. Parts are made when asked for; axes
+    same in all. The control steers all CMGs as one cluster. Random phases are drawn for units
+    counted through the scenarios in the order of their names. Parts are made when asked for; axes
     are those of the bus.
 
     Raises:
@@ -58,7 +61,10 @@ class PlatformStudy:
     @cached_property
     def platforms(self) -> Platforms:
         """The equations."""
-        satellites = [build_satellite(scenario, "isolated") for scenario in self.scenarios]
+        satellites = [
+            build_satellite(scenario, "isolated", first)
+            for scenario, first in zip(self.scenarios, _first_units(self.scenarios), strict=True)
+        ]
         return Platforms.assemble(satellites, self.gimbal_angles)
 
     @cached_property
@@ -78,10 +84,29 @@ class PlatformStudy:
         return self.platforms.strokes(self._responses["isolated"])
 
     def combined(self, mount: str) -> Combined:
-        """Bus rate of all rotors and orders together [rad/s]."""
+        """Bus rate of all rotors and orders together [rad/s]; noise is in the RMS alone."""
         phases = [s.cluster.rotor_phase for s in self.platforms.satellites]
         angles = np.outer(np.concatenate(phases), self.platforms.orders)
-        return combine(self.bus_rate(mount), self.platforms.frequency, angles)
+        combined = combine(self.bus_rate(mount), self.platforms.frequency, angles)
+        return combined.with_noise(self._noise_square[mount])
+
+    @cached_property
+    def _noise_square(self) -> dict[str, np.ndarray]:
+        """(axis,) mean square of the bus rate by noise, by mount [rad^2/s^2]."""
+        found = {}
+        for mount, small in (("isolated", self.platforms.small), ("rigid", self.platforms.bolted)):
+            modes = np.linalg.eigvals(small.state_matrix())
+            grids = [
+                frequency_grid(satellite, modes)
+                for satellite in self.platforms.satellites
+                if satellite.disturbance is not None and satellite.disturbance.noisy
+            ]
+            found[mount] = np.zeros(3)
+            if grids:
+                frequency = np.unique(np.concatenate(grids))
+                psd = self.platforms.noise_psd(frequency, mount)
+                found[mount] = trapezoid(psd.sum(axis=1), frequency, axis=0)
+        return found
 
     def static_stroke(self, torque: ArrayLike) -> tuple[np.ndarray, ...]:
         """Strokes (leg,) [m] of each platform's legs as a control torque [N m] sets in."""
@@ -101,6 +126,17 @@ class PlatformStudy:
             return None
         held = self.platforms.satellites[0].steering is None
         return analyze_coupled(self.platforms.controlled(self.pid, "ideal" if held else "servo"))
+
+
+def _first_units(scenarios: Sequence[Scenario]) -> list[int]:
+    """Number of each scenario's first unit, whatever the order in which scenarios are given."""
+    first, found = 0, [0] * len(scenarios)
+    for i in sorted(
+        range(len(scenarios)), key=lambda i: (scenarios[i].name, scenarios[i].to_yaml())
+    ):
+        found[i] = first
+        first += scenarios[i].cluster.count
+    return found
 
 
 def _check_shared(scenarios: Sequence[Scenario]) -> None:

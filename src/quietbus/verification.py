@@ -374,7 +374,7 @@ def rotors_of(
     units = scenario.cluster.placed()
     if "rotor_speed" not in run:
         speed = np.array([unit.rotor.speed if unit.rotor else 0.0 for unit in units])
-        return speed, np.array(scenario.cluster.rotor_phases or np.zeros(len(units)))
+        return speed, np.array(scenario.cluster.phases())
     time = run["time"].to_numpy()
     start, end = stretch or (time[0], time[-1])
     here = (time >= start - 1e-9) & (time <= end + 1e-9)

@@ -314,3 +314,97 @@ def test_what_cannot_be_put_together_is_refused_by_name(paper):
     preloaded = parts[0].with_overrides({"isolator.legs.free_length": 0.30})
     with pytest.raises(ValueError, match="no equilibrium here: a platform accelerates by"):
         qb.platforms([preloaded, *parts[1:]])
+
+
+SLOW_SERVOS = (50.0, 2.0, 2.0, 2.0)  # [rad/s]
+
+
+@pytest.fixture(scope="module")
+def servos(paper):
+    """Four platforms with gimbal servos that are not alike."""
+    parts = qb.per_cmg_scenarios(paper)
+    return [
+        part.with_overrides({"cluster.gimbal_bandwidth": bandwidth})
+        for part, bandwidth in zip(parts, SLOW_SERVOS, strict=True)
+    ]
+
+
+def test_every_gimbal_has_the_servo_of_its_own_platform(servos):
+    """Poles of the free servos; and the loop's poles by another derivation, of the vibration."""
+    study = qb.platforms(servos)
+    model = study.platforms.linear()
+    free = np.sort(np.linalg.eigvals(model.A).real)
+    for bandwidth in SLOW_SERVOS:
+        assert np.min(np.abs(free + bandwidth)) < 1e-9 * bandwidth
+    closed = study.platforms.controlled(study.pid).poles(study.pid.gain)
+    expected = np.linalg.eigvals(study.platforms.small.state_matrix())
+    for pole in closed[np.abs(closed) > 1e-3]:
+        assert np.min(np.abs(expected - pole)) < 1e-6 * max(abs(pole), 1.0)
+
+
+def test_the_order_of_platforms_does_not_matter(servos):
+    changes = {"cluster.rotor_phases": "random"}
+    given = [s.with_overrides(changes) for s in servos]
+    one, other = (qb.platforms(order) for order in (given, given[::-1]))
+    assert one.coupled.stable_gain_range[0] == pytest.approx(
+        other.coupled.stable_gain_range[0], rel=1e-6
+    )
+    assert one.coupled.disk_margin == pytest.approx(other.coupled.disk_margin, rel=1e-6)
+    for mount in ("isolated", "rigid"):
+        for kind in ("envelope", "worst_case", "rss", "rms"):
+            both = (getattr(study.combined(mount), kind) for study in (one, other))
+            np.testing.assert_allclose(*both, rtol=1e-9)
+    phases = [float(s.cluster.rotor_phase[0]) for s in one.platforms.satellites]
+    assert len({round(phase, 9) for phase in phases}) == 4
+
+
+LINES_AND_NOISE = {
+    "orders": [{"order": 1.5, "radial_force": 1e-6, "axial_torque": 1e-8, "phase": "random"}],
+    "broadband": {"radial_torque": {"frequency": [1.0, 300.0], "psd": [4e-5, 1e-6]}},
+    "seed": 3,
+}
+
+
+@pytest.fixture(scope="module")
+def noisy(paper):
+    """With random phases of rotors and of a table's line, and with noise."""
+    return paper.with_overrides(
+        {"cluster.rotor_phases": "random", "cluster.rotor.disturbance": LINES_AND_NOISE}
+    )
+
+
+def test_the_rms_of_one_platform_has_the_noise_that_the_jitter_study_has(noisy):
+    turned = noisy.with_overrides({"isolator.orientation": ["10 deg", "-20 deg", "30 deg"]})
+    one, expected = qb.platforms([turned], [ANGLES]), qb.jitter(turned, ANGLES)
+    whole = expected.combined("isolated").rms
+    assert np.all(expected.noise("isolated").variance("bus_rate", 1)[0] > 1e-4 * whole**2)
+    assert one.combined("isolated").rms == pytest.approx(whole, rel=1e-9)
+
+
+def test_what_is_random_differs_from_cmg_to_cmg_and_is_that_of_the_one_platform(noisy):
+    whole = build_satellite(noisy)
+    parts = qb.per_cmg_scenarios(noisy)
+    assert len({part.cluster.seeds[0] for part in parts}) == 4
+    for j, part in enumerate(build_satellite(s) for s in parts):
+        for of in (
+            lambda s: s.cluster.rotor_phase,
+            lambda s: s.disturbance.phase,
+            lambda s: s.disturbance.coefficient,
+        ):
+            np.testing.assert_allclose(of(part)[0], of(whole)[j], rtol=1e-14)
+    assert len(np.unique(np.round(whole.cluster.rotor_phase, 9))) == 4
+
+
+@pytest.mark.slow
+def test_noise_of_platforms_bolted_down_is_that_of_one_bolted_platform(noisy):
+    """Rigid bodies on a rigid bus: masses may be shared out as they like."""
+    light = {f"isolator.legs.{part}_part": LIGHT for part in ("upper", "lower")}
+    bare = noisy.with_overrides(
+        light
+        | {"control": "none", "isolator.plate.mass": 1e-6}
+        | {"isolator.plate.inertia": (1e-8 * np.eye(3)).tolist()}
+    )
+    one, parts = qb.platforms([bare]), qb.platforms(qb.per_cmg_scenarios(bare))
+    frequency = np.array([3.0, 40.0, 250.0])
+    both = [study.platforms.noise_psd(frequency, "rigid") for study in (one, parts)]
+    np.testing.assert_allclose(*both, rtol=1e-5)

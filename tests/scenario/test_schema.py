@@ -523,6 +523,32 @@ def test_tolerances_that_cannot_be_met_or_mean_nothing_are_refused(wrong):
     assert "expected a number from" in problem(simulation={"tolerances": wrong})
 
 
+def test_rotor_phases_left_out_are_drawn_evenly_and_alike_each_time():
+    """Uniform over the turn: the mean of exp(i phi) of n draws is of size 1/sqrt(n)."""
+    cluster = {
+        k: v for k, v in DATA["cluster"].items() if k not in ("rotor_phases", "gimbal_angles")
+    }
+    cluster["pyramid"] = cluster["pyramid"] | {"units": 400}
+    drawn, again = (Scenario.from_dict(DATA | {"cluster": cluster}).cluster for _ in range(2))
+    assert drawn.rotor_phases == "random"
+    assert drawn.phases() == again.phases()
+    phases = np.array(drawn.phases())
+    assert np.all(np.abs(phases) <= np.pi)
+    assert np.abs(np.mean(np.exp(1j * phases))) < 3.0 / np.sqrt(400)
+    assert len(np.unique(phases)) == 400
+    assert drawn.phases(first=7)[:3] == drawn.phases()[7:10]
+    other = cluster | {"rotor": cluster["rotor"] | {"disturbance": {"seed": 1}}}
+    assert not set(Scenario.from_dict(DATA | {"cluster": other}).cluster.phases()) & set(phases)
+    given = cluster | {"pyramid": DATA["cluster"]["pyramid"], "rotor_phases": ["90 deg", 0, 0, 1]}
+    assert Scenario.from_dict(DATA | {"cluster": given}).cluster.phases() == (np.pi / 2, 0, 0, 1)
+
+
+@pytest.mark.parametrize("wrong", ["randon", "0.7 rad", 0.7])
+def test_rotor_phases_are_random_or_a_list(wrong):
+    message = problem(cluster=DATA["cluster"] | {"rotor_phases": wrong})
+    assert "cluster.rotor_phases: expected random, or a list of one or more angles, got" in message
+
+
 def test_pseudo_inverse_needs_three_units():
     cluster = DATA["cluster"] | {"pyramid": DATA["cluster"]["pyramid"] | {"units": 2}}
     for key in ("rotor_phases", "gimbal_angles"):

@@ -32,10 +32,14 @@ from quietbus.dynamics.vibration import (
     vibration,
 )
 from quietbus.model.cmg import ControlMomentGyro
-from quietbus.model.disturbance import orders_of
+from quietbus.model.controller import GimbalServo
+from quietbus.model.disturbance import on_plate, orders_of
 from quietbus.model.guidance import StepGuidance
 from quietbus.model.satellite import Satellite
 from quietbus.spatial.rotation import quaternion_to_matrix
+from quietbus.spatial.vector import rotate
+
+CHUNK = 256  # frequencies of noise that programs share
 
 
 @dataclass(frozen=True)
@@ -128,6 +132,41 @@ class Platforms:
             xi = np.linalg.solve(Z, (force @ self.rigid)[..., None])[..., 0] @ self.rigid.T
         return np.where(standing[..., None], 0.0, xi.reshape(*s.shape, -1))
 
+    def noise_psd(self, frequency: np.ndarray, mount: str = "isolated") -> np.ndarray:
+        """(f, cmg, axis) one-sided PSD [(rad/s)^2/Hz] of the bus rate by each rotor's noise.
+
+        Args:
+            frequency: (f,) [Hz].
+        """
+        frequency = np.asarray(frequency, float)
+        parts = []
+        for start in range(0, len(frequency), CHUNK):
+            these = frequency[start : start + CHUNK]
+            padded = np.pad(these, (0, CHUNK - len(these)), mode="edge")
+            parts.append(self._noise_psd(padded, mount)[: len(these)])
+        return np.concatenate(parts)
+
+    def _noise_psd(self, frequency: np.ndarray, mount: str) -> np.ndarray:
+        small = self.small if mount == "isolated" else self.bolted
+        omega, size = 2.0 * np.pi * frequency, len(self.rigid)
+        Z = np.asarray(_dynamic_stiffness(small, jnp.asarray(1j * omega)))
+        bus = np.arange(size - 6, size)
+        found = []
+        for i, (own, gamma) in enumerate(zip(self.satellites, self.gimbal_angles, strict=True)):
+            if own.disturbance is None or not own.disturbance.noisy:
+                found.append(np.zeros((len(omega), len(gamma), 3)))
+                continue
+            wrench, density = map(np.asarray, _noise(own, gamma, jnp.asarray(frequency)))
+            rows = np.concatenate([np.arange(6 * i, 6 * i + 6), bus])
+            force = np.pad(wrench.reshape(len(omega), -1, 6), ((0, 0), (0, 0), (0, 6)))
+            force = np.swapaxes(_spread(force, rows, size, axis=-1), 1, 2)
+            if mount != "isolated":
+                force = self.rigid.T @ force
+            rate = omega[:, None, None] * np.abs(np.linalg.solve(Z, force)[:, -3:])
+            rate = rate.reshape(len(omega), 3, *density.shape[1:])
+            found.append(np.einsum("fjc,fajc->fja", density, rate**2))
+        return np.concatenate(found, axis=1)
+
     def strokes(self, xi: np.ndarray) -> tuple[np.ndarray, ...]:
         """Strokes (..., leg) [m] of each platform's legs for freedoms (..., 6 n + 6)."""
         found = []
@@ -216,16 +255,16 @@ class Platforms:
             A = np.block([[zero, np.eye(m)], [pull, damp]])
             B = np.vstack([np.zeros((m, 3)), by_rate @ command])
         else:
-            bandwidth = float(self.satellites[0].servo.bandwidth)
-            driven = by_rate - bandwidth * by_acceleration
+            bandwidth = np.asarray(_servos(self.satellites).bandwidth)
+            driven = by_rate - by_acceleration * bandwidth
             A = np.block(
                 [
                     [zero, np.eye(m), np.zeros((m, cmg))],
                     [pull, damp, driven],
-                    [np.zeros((cmg, 2 * m)), -bandwidth * np.eye(cmg)],
+                    [np.zeros((cmg, 2 * m)), -np.diag(bandwidth)],
                 ]
             )
-            lag = bandwidth * command
+            lag = bandwidth[:, None] * command
             B = np.vstack([np.zeros((m, 3)), by_acceleration @ lag, lag])
         unit = np.eye(len(A))
         return LinearModel(
@@ -277,19 +316,35 @@ class Platforms:
 
 
 def as_one_cluster(satellites: Sequence[Satellite]) -> Satellite:
-    """The first satellite with the CMGs of all on one plate along bus axes, as steering sees them.
+    """The CMGs of all, each with its servo, on one plate along bus axes, as steering sees them.
 
-    Its legs and plate mean nothing; what control and steering decide depends on neither.
+    Control and steering law are those of all; legs and plate mean nothing, since what control and
+    steering decide depends on neither.
     """
     turned = []
     for satellite in satellites:
         R_BP = np.asarray(quaternion_to_matrix(satellite.q_BP))
         cluster: ControlMomentGyro = satellite.cluster
         places = np.asarray(satellite.p_BP_B) + np.asarray(cluster.p_PC_P) @ R_BP.T
-        turned.append(replace(cluster, p_PC_P=places, R_PG0=R_BP @ np.asarray(cluster.R_PG0)))
+        axes = R_BP @ np.asarray(cluster.R_PG0)
+        # at rest a run-up has its end speeds, and nothing drives the rotors
+        turned.append(replace(cluster, p_PC_P=places, R_PG0=axes, drive=None))
     whole = jax.tree.map(lambda *each: jnp.concatenate(each), *turned)
     unit = jnp.array([1.0, 0.0, 0.0, 0.0])
-    return replace(satellites[0], cluster=whole, q_BP=unit, disturbance=None, motor=None)
+    return replace(
+        satellites[0],
+        cluster=whole,
+        q_BP=unit,
+        servo=_servos(satellites),
+        disturbance=None,
+        motor=None,
+    )
+
+
+def _servos(satellites: Sequence[Satellite]) -> GimbalServo:
+    """Each CMG's own; limits, which do not act at rest, are left out."""
+    each = [np.full(len(s.cluster.rotor_speed), float(s.servo.bandwidth)) for s in satellites]
+    return GimbalServo(jnp.asarray(np.concatenate(each)), None, None)
 
 
 def _equations(
@@ -340,6 +395,20 @@ def _platform(satellite: Satellite, gimbal_angle: Float[Array, " cmg"]) -> _Part
 @eqx.filter_jit
 def _decisions(satellite: Satellite, gimbal_angle: Float[Array, " cmg"]) -> Control | None:
     return control_path(*at_rest(satellite, jnp.asarray(gimbal_angle)))
+
+
+@eqx.filter_jit
+def _noise(satellite, gimbal_angle, frequency):
+    """Wrench on the plate by each channel of each rotor (f, cmg, channel, 6), and PSD of these."""
+    disturbance, cluster = satellite.disturbance, satellite.cluster
+    R_BP = quaternion_to_matrix(satellite.q_BP)
+
+    def wrench(frequency):
+        each = disturbance.unit_inputs(cluster, 2.0 * jnp.pi * frequency)
+        each = on_plate(cluster, gimbal_angle, each)
+        return rotate(R_BP, each.reshape(*each.shape[:-1], 2, 3)).reshape(each.shape)
+
+    return jax.vmap(wrench)(frequency), disturbance.density(frequency)
 
 
 @eqx.filter_jit

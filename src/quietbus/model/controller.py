@@ -55,7 +55,7 @@ class PIDController(eqx.Module):
 class GimbalServo(eqx.Module):
     """First-order gimbal-rate servo with rate and acceleration limits."""
 
-    bandwidth: Float[Array, ""]  # [rad/s]
+    bandwidth: Float[Array, ""] | Float[Array, " cmg"]  # [rad/s] of all, or of each
     rate_limit: Float[Array, ""] | None  # [rad/s]
     acceleration_limit: Float[Array, ""] | None  # [rad/s^2]
 

@@ -180,7 +180,7 @@ def last_lines(run: xr.Dataset) -> RotorLines:
     units = scenario.cluster.placed()
     orders = last["order"].to_numpy()
     speed = np.array([unit.rotor.speed if unit.rotor else 0.0 for unit in units])
-    phase = np.array(scenario.cluster.rotor_phases or np.zeros(len(units)))
+    phase = np.array(scenario.cluster.phases())
     if "rotor_speed" in last:
         speed, phase = last["rotor_speed"].to_numpy(), last["rotor_angle"].to_numpy()
     return RotorLines(

@@ -21,5 +21,5 @@ def rotors(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
     """Speeds [rad/s] and phases [rad] of the rotors; zero where a unit has no rotor."""
     units = scenario.cluster.placed()
     speed = np.array([unit.rotor.speed if unit.rotor else 0.0 for unit in units])
-    phase = np.array(scenario.cluster.rotor_phases or np.zeros(len(units)))
+    phase = np.array(scenario.cluster.phases())
     return speed, phase

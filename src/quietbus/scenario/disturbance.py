@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import BeforeValidator, Discriminator, Tag, ValidationInfo, model_validator
 
 from quietbus.scenario.base import (
@@ -24,7 +25,15 @@ from quietbus.scenario.limits import MOST_HARMONICS, MOST_LINES_A_TURN
 from quietbus.scenario.units import Quantity, expected
 from quietbus.scenario.wheel_files import read_wheel_table
 
-COMPONENTS = ("radial_force", "axial_force", "radial_torque", "axial_torque")
+# channels of the model: a component that turns has one forward and one backward
+CHANNELS_OF = {
+    "radial_force": (0, 1),
+    "axial_force": (2,),
+    "radial_torque": (3, 4),
+    "axial_torque": (5,),
+}
+CHANNEL_COUNT = 6
+COMPONENTS = tuple(CHANNELS_OF)
 
 ForceCoefficient = Annotated[
     float, Quantity("a force coefficient, force over speed squared,", "kg*m", least=0.0)
@@ -64,10 +73,10 @@ Phase = Annotated[
 class Phases(Part):
     """A phase for each component."""
 
-    radial_force: Phase = 0.0
-    axial_force: Phase = 0.0
-    radial_torque: Phase = 0.0
-    axial_torque: Phase = 0.0
+    radial_force: Phase = "random"
+    axial_force: Phase = "random"
+    radial_torque: Phase = "random"
+    axial_torque: Phase = "random"
 
 
 class Order(Part):
@@ -84,12 +93,17 @@ class Order(Part):
         | Annotated[Literal["random"], Tag("<random>")]
         | Annotated[Phases, Tag("<each>")],
         Discriminator(_phase_form),
-    ] = 0.0
+    ] = "random"
 
     @property
     def acts(self) -> bool:
         """Whether any coefficient is not zero."""
         return any(getattr(self, component) > 0.0 for component in COMPONENTS)
+
+    def channel_of(self, component: str) -> int:
+        """Channel of one of ``COMPONENTS``, by the sense in which it turns."""
+        channels = CHANNELS_OF[component]
+        return channels[0] if self.whirl == "forward" else channels[-1]
 
     def phase_of(self, component: str) -> float | Literal["random"]:
         """Phase [rad] of one of ``COMPONENTS``, against order times rotor angle."""
@@ -194,6 +208,27 @@ class Disturbance(Part):
     resonances: Resonances = Resonances()
     broadband: Broadband = Broadband()
     seed: Annotated[int, BeforeValidator(_seed)] = 0  # of random phases and of the noise
+
+    def phases(self, unit: int) -> tuple[dict[str, float], ...]:
+        """Phase of each component of each line [rad], drawn where it is random.
+
+        Args:
+            unit: number of the rotor in the satellite; rotors of one seed differ by it.
+        """
+        lines = self.orders or ()
+        # drawn for all, whether random or not, so that a phase given changes no other
+        generator = np.random.default_rng([self.seed, unit])
+        drawn = generator.uniform(-np.pi, np.pi, (len(lines), CHANNEL_COUNT))
+        found = []
+        for line, own in zip(lines, drawn, strict=True):
+            given = {name: line.phase_of(name) for name in COMPONENTS}
+            found.append(
+                {
+                    name: float(own[line.channel_of(name)]) if phase == "random" else phase
+                    for name, phase in given.items()
+                }
+            )
+        return tuple(found)
 
     @model_validator(mode="before")
     @classmethod

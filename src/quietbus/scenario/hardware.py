@@ -5,7 +5,14 @@ from __future__ import annotations
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import (
+    BeforeValidator,
+    Discriminator,
+    SerializerFunctionWrapHandler,
+    Tag,
+    model_serializer,
+    model_validator,
+)
 
 from quietbus.scenario.base import (
     ZERO,
@@ -42,6 +49,7 @@ from quietbus.scenario.disturbance import Disturbance, GimbalMotor
 from quietbus.scenario.errors import Findings
 from quietbus.scenario.limits import MOST_LEGS, MOST_UNITS
 from quietbus.scenario.run_up import RunUp
+from quietbus.scenario.units import expected
 
 
 class Bus(Part):
@@ -302,6 +310,26 @@ class Unit(Part):
         return self
 
 
+def _phases_form(value: Any) -> str:
+    return "<random>" if isinstance(value, str) else "<each>"
+
+
+def _phases(value: Any) -> Any:
+    if value is None:
+        return "random"
+    if not isinstance(value, list | tuple | np.ndarray) and value != "random":
+        raise expected("random, or a list of one or more angles", value)
+    return value
+
+
+RotorPhases = Annotated[
+    Annotated[Literal["random"], Tag("<random>")] | Annotated[Series[Angle], Tag("<each>")],
+    Discriminator(_phases_form),
+    BeforeValidator(_phases),
+]
+ROTOR_PHASE = 2  # of the streams of random numbers of a rotor
+
+
 class Placed(Part):
     """What clusters of CMGs and of reaction wheels have in common.
 
@@ -314,7 +342,7 @@ class Placed(Part):
 
     pyramid: Pyramid | None = None
     rotor: Rotor
-    rotor_phases: Series[Angle] | None = None  # rotor angles at the start; None: zeros
+    rotor_phases: RotorPhases = "random"  # rotor angles at the start
     run_up: RunUp | None = None  # None: speeds as the rotors have them
 
     @property
@@ -331,6 +359,21 @@ class Placed(Part):
         """Of the rotors' random phases and noise."""
         rotors = (unit.rotor for unit in self.placed())
         return tuple(r.disturbance.seed if r and r.disturbance else 0 for r in rotors)
+
+    def phases(self, first: int = 0) -> tuple[float, ...]:
+        """Rotor angles at the start [rad]: as given, or drawn evenly from -pi to pi.
+
+        What is drawn for a rotor depends on the seed of its disturbance and on its number alone.
+
+        Args:
+            first: number of the first unit, where others come before these.
+        """
+        if self.rotor_phases != "random":
+            return self.rotor_phases
+        return tuple(
+            float(np.random.default_rng([seed, j, ROTOR_PHASE]).uniform(-np.pi, np.pi))
+            for j, seed in enumerate(self.seeds, first)
+        )
 
     def placed(self) -> tuple[Any, ...]:
         """All units, each with its parts."""

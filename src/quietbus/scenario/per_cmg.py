@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from quietbus.scenario.disturbance import Disturbance
 from quietbus.scenario.errors import Problem, ScenarioError
 from quietbus.scenario.schema import Scenario
 from quietbus.scenario.wheels import WheelCluster
@@ -20,7 +21,8 @@ def per_cmg_scenarios(scenario: Scenario, scale: float | None = None) -> list[Sc
     squared. So stiffness, damping and mass of all platforms together are those of the one, and
     frequencies and damping ratios in translation are too. The upper plate's centre is where the
     CMG stood, so CMGs and lever arms stay; the base plates come nearer by the shorter separation.
-    Plates stay parallel.
+    Plates stay parallel. Random phases are those that the one platform has, as numbers, and the
+    rotors' noise has seeds of its own: as files, the scenarios know nothing of each other.
 
     What comes out are usual scenarios: write them to files, change them, give them to
     ``quietbus.platforms``. External loads are left out.
@@ -50,7 +52,7 @@ def per_cmg_scenarios(scenario: Scenario, scale: float | None = None) -> list[Sc
     separation = scale * isolator["separation"]
     legs = _times(isolator["legs"], _BY_LEG, share, scale)
     plate = _times(isolator["plate"], _BY_PLATE, share, scale)
-    phases = data["cluster"].get("rotor_phases", [0.0] * n)
+    phases = scenario.cluster.phases()
     angles = data["cluster"].get("gimbal_angles", [0.0] * n)
     found = []
     for j, unit in enumerate(scenario.cluster.placed()):
@@ -58,6 +60,8 @@ def per_cmg_scenarios(scenario: Scenario, scale: float | None = None) -> list[Sc
         offset = isolator["offset"] + base.apply(np.add(unit.position, height))
         cluster = {k: v for k, v in data["cluster"].items() if k not in ("pyramid", "units")}
         place: dict[str, Any] = unit.model_dump(mode="json", exclude_none=True)
+        if unit.rotor and unit.rotor.disturbance:
+            place["rotor"]["disturbance"] |= _drawn(unit.rotor.disturbance, j)
         cluster |= {
             "units": [
                 {k: place[k] for k in ("gimbal_axis", "spin_axis")} | {"position": [0, 0, 0]}
@@ -67,6 +71,9 @@ def per_cmg_scenarios(scenario: Scenario, scale: float | None = None) -> list[Sc
             "rotor_phases": [phases[j]],
             "gimbal_angles": [angles[j]],
         }
+        if "run_up" in cluster:
+            each = {k: v[j] for k, v in cluster["run_up"].items() if isinstance(v, list)}
+            cluster["run_up"] = cluster["run_up"] | each
         own = isolator | {
             "offset": offset.tolist(),
             "separation": separation,
@@ -77,6 +84,18 @@ def per_cmg_scenarios(scenario: Scenario, scale: float | None = None) -> list[Sc
         changed = {"name": name, "isolator": own, "cluster": cluster, "loads": []}
         found.append(Scenario.from_dict(data | changed, name))
     return found
+
+
+def _drawn(disturbance: Disturbance, unit: int) -> dict[str, Any]:
+    """What was random of a rotor: phases as numbers, and a seed that no other rotor has."""
+    seed = np.random.SeedSequence([disturbance.seed, unit]).generate_state(1)[0]
+    if disturbance.orders is None:
+        return {"seed": int(seed)}
+    orders = [
+        line.model_dump(mode="json", exclude_none=True) | {"phase": phase}
+        for line, phase in zip(disturbance.orders, disturbance.phases(unit), strict=True)
+    ]
+    return {"seed": int(seed), "orders": orders}
 
 
 _BY_PLATE = {"mass": (1, 0), "inertia": (1, 2), "center_of_mass": (0, 1)}

@@ -84,7 +84,7 @@ def noise_spectra(
         modes: eigenvalues of the satellite [rad/s], about which frequencies are dense.
     """
     assert satellite.disturbance is not None
-    frequency = _grid(satellite, modes)
+    frequency = frequency_grid(satellite, modes)
     parts = []
     for start in range(0, len(frequency), CHUNK):
         these = frequency[start : start + CHUNK]
@@ -106,8 +106,13 @@ def _band(disturbance: Disturbance) -> tuple[float, float]:
     return float(min(t[0] for t in tables)), float(max(t[-1] for t in tables))
 
 
-def _grid(satellite: Satellite, modes: np.ndarray) -> np.ndarray:
-    """Frequencies [Hz] that resolve the tables, their ends, and the peaks of modes."""
+def frequency_grid(satellite: Satellite, modes: np.ndarray) -> np.ndarray:
+    """Frequencies [Hz] that resolve the tables, their ends, and the peaks of modes.
+
+    Args:
+        satellite: with noise.
+        modes: eigenvalues [rad/s] about which frequencies are dense.
+    """
     disturbance = satellite.disturbance
     assert disturbance is not None
     low, high = _band(disturbance)

@@ -92,7 +92,7 @@ def _draw(axes: Axes, values: np.ndarray, ratios: np.ndarray) -> None:
 
 def _ratios(scenario: Scenario, gimbals: np.ndarray) -> np.ndarray:
     """[%] Peak rate isolated over rigid: per axis, and worst axis over worst axis (4,)."""
-    phases = np.asarray(scenario.cluster.rotor_phases, float)
+    phases = np.asarray(scenario.cluster.phases(), float)
     return _ratios_by_phase(scenario, gimbals, phases[None])[0]
 
 
