@@ -11,7 +11,7 @@ import typer
 
 import quietbus as qb
 from quietbus import cli
-from quietbus.results import JOINT_VARIABLES, ROTOR_VARIABLES, VARIABLES, Summary
+from quietbus.results import CONTROL_VARIABLES, JOINT_VARIABLES, ROTOR_VARIABLES, VARIABLES, Summary
 from quietbus.scenario import builtin_names
 from quietbus.scenario.base import Count, Part
 from quietbus.scenario.control import LAWS
@@ -115,7 +115,7 @@ def test_results_page_has_every_variable_with_dimensions_and_unit():
         _unquoted(name): (tuple(dimensions.split(", ")) if dimensions else (), unit)
         for name, dimensions, unit, _, _ in _rows(_text("docs/results.md"), heading)
     }
-    variables = VARIABLES | ROTOR_VARIABLES | JOINT_VARIABLES
+    variables = VARIABLES | CONTROL_VARIABLES | ROTOR_VARIABLES | JOINT_VARIABLES
     described = {name: (dims, unit) for name, (dims, unit, _) in variables.items()}
     assert documented == described
 

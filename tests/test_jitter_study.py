@@ -23,6 +23,35 @@ def numbers(study):
     return study.to_dict()
 
 
+def test_the_worst_case_of_a_direct_run_is_that_over_all_rotor_phases(study):
+    """Reached by phases that put all lines of an axis in line; at the angles of the run's end."""
+    run = qb.simulate("zhang2012", duration=0.02)
+    found = qb.worst_over_phases(run)
+    at_end = qb.jitter("zhang2012", run["gimbal_angle"].to_numpy()[-1])
+    rate, orders = at_end.bus_rate("isolated"), np.array(at_end.orders)
+    for axis in range(3):
+        first = rate[:, 0, axis]  # order 2 of a rigid rotor is nothing
+        aligned = -np.angle(first)
+        turned = rate[..., axis] * np.exp(1j * aligned[:, None] * orders)
+        assert found[axis] == pytest.approx(np.abs(turned[:, 0].sum()), rel=1e-6)
+    assert np.all(found > 1.001 * at_end.combined("isolated").envelope)
+
+
+def test_phases_of_zero_let_a_symmetric_cluster_cancel_and_the_default_does_not():
+    """An even bus: in phase four CMGs cancel about x and y; left out, phases are typical."""
+    even = {"bus.inertia": np.diag([900.0, 900.0, 800.0]).tolist()}
+    scenario = qb.load_scenario("zhang2012").with_overrides(even)
+    data = scenario.to_dict()
+    del data["cluster"]["rotor_phases"]
+    typical = qb.jitter(qb.Scenario.from_dict(data)).combined("rigid")
+    zero = scenario.with_overrides({"cluster.rotor_phases": [0.0] * 4})
+    cancelled = qb.jitter(zero).combined("rigid")
+    assert cancelled.worst_case == pytest.approx(typical.worst_case, rel=1e-12)
+    norm = lambda values: np.linalg.norm(values[:2])  # noqa: E731
+    assert norm(cancelled.envelope) < 0.02 * norm(cancelled.worst_case)
+    assert norm(typical.envelope) > 0.2 * norm(typical.worst_case)
+
+
 def test_static_imbalance_on_a_rigid_mount_has_a_closed_form():
     """A force m e Omega^2 turning in the rotor's plane, on one rigid body without net momentum."""
     light = {"mass": 0, "distance": 0.1, "transverse_inertia": 0, "axial_inertia": 0}

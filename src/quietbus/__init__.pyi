@@ -1,6 +1,7 @@
 from .analysis.isolator import SingleAxisIsolator as SingleAxisIsolator
 from .analysis.run_up import compare_run_up as compare_run_up
 from .analysis.waterfall import FitError as FitError
+from .api import ImplausibleValue as ImplausibleValue
 from .api import QuietbusWarning as QuietbusWarning
 from .api import SimulationError as SimulationError
 from .api import analyze as analyze
@@ -10,6 +11,7 @@ from .api import linearize as linearize
 from .api import platforms as platforms
 from .api import simulate as simulate
 from .api import verify as verify
+from .api import worst_over_phases as worst_over_phases
 from .jitter_study import JitterStudy as JitterStudy
 from .measured import MapError as MapError
 from .measured import WaterfallFit as WaterfallFit

@@ -17,12 +17,21 @@ from quietbus.build import build_initial_state, build_satellite
 from quietbus.dynamics.linearize import Actuator, LinearModel, OperatingPoint
 from quietbus.dynamics.linearize import linearize as linearize_satellite
 from quietbus.jitter_study import JitterStudy
+from quietbus.jitter_study import worst_over_phases as worst_phases_at_rest
 from quietbus.platform_study import PlatformStudy
 from quietbus.resolution import refuse_coarse_output, refuse_coarse_tolerance, unseen
-from quietbus.results import aliasing, rotor_notes, to_dataset
+from quietbus.results import (
+    aliasing,
+    delivery_notes,
+    rotor_notes,
+    scenario_of,
+    summarize,
+    to_dataset,
+)
 from quietbus.results.checkpoint import Checkpoint
 from quietbus.results.task import Task
 from quietbus.scenario import LineOfSight, Problem, Scenario, ScenarioError, load_scenario
+from quietbus.scenario.plausibility import implausible
 from quietbus.scenario.pointing import NO_REQUIREMENTS
 from quietbus.scenario.wheels import WheelCluster
 from quietbus.solve.direct import Reached, Scheme, Tolerances, integrate
@@ -41,6 +50,10 @@ Notes = tuple[str, ...]
 
 class QuietbusWarning(UserWarning):
     """Something in a run that the user should know before trusting its numbers."""
+
+
+class ImplausibleValue(QuietbusWarning):
+    """A value of a scenario that no satellite has; most often its unit was left out."""
 
 
 class SimulationError(RuntimeError):
@@ -109,17 +122,19 @@ def simulate(
         if joint_forces:
             raise ValueError("joint_forces needs method 'direct'")
         scenario = _as_run(scenario, mount, duration, output_rate or HARMONIC_RATE)
+        _tell_implausible(scenario)
         task = _harmonic_task(scenario, points or {}, lines_of_sight or {})
         run, notes = _kept(_harmonic, task, progress, checkpoint, resume)
     else:
         if points or lines_of_sight:
             raise ValueError("points and lines_of_sight need method 'harmonic'")
         scenario = _as_run(scenario, mount, duration, output_rate)
+        _tell_implausible(scenario)
         refuse_coarse_output(scenario)
         task = Task(scenario, "direct", joint_forces)
         run, notes = _kept(_direct, task, progress, checkpoint, resume)
         notes += tuple(filter(None, [aliasing(scenario)]))
-    for note in (*notes, *rotor_notes(run)):
+    for note in (*notes, *rotor_notes(run), *delivery_notes(run)):
         warnings.warn(note, QuietbusWarning, stacklevel=2)
     if run.attrs["status"] == "stopped":
         raise SimulationError(run.attrs["stop_reason"], run)
@@ -164,6 +179,7 @@ def compare(
         troubles.extend(said)
         return done
 
+    _tell_implausible(_as_run(scenario, None, duration))
     refuse_coarse_output(_as_run(scenario, None, duration))
     warning = aliasing(_as_run(scenario, None, duration))
     if warning:
@@ -181,9 +197,24 @@ def compare(
         warnings.warn(trouble, QuietbusWarning, stacklevel=2)
     for name, done in runs.items():
         aliased = _aliased(_as_run(scenario, None, duration), done)
-        for note in (*filter(None, [aliased]), *rotor_notes(done)):
+        for note in (*filter(None, [aliased]), *rotor_notes(done), *delivery_notes(done)):
             warnings.warn(f"{name}: {note}", QuietbusWarning, stacklevel=2)
     return runs
+
+
+def worst_over_phases(run: xr.Dataset) -> np.ndarray | None:
+    """(3,) jitter of the bus rate [rad/s] at the end of a run for the worst rotor phases.
+
+    The sum of the amplitudes of all rotors' lines, noise left out: of a harmonic run as it is, of
+    a direct one by the harmonic view of the satellite at rest, with the gimbal angles and rotor
+    speeds of the end. None where there is no such steady motion. `summarize` takes it.
+    """
+    if run.attrs["method"] == "harmonic":
+        return summarize(run).worst_phases_rate
+    last = run.isel(time=-1)
+    speed = last["rotor_speed"].to_numpy() if "rotor_speed" in run else None
+    angles = last["gimbal_angle"].to_numpy()
+    return worst_phases_at_rest(scenario_of(run), run.attrs["mount"], angles, speed)
 
 
 def analyze(scenario: Scenario | str, gimbal_angle: ArrayLike | None = None) -> Study:
@@ -202,6 +233,7 @@ def analyze(scenario: Scenario | str, gimbal_angle: ArrayLike | None = None) -> 
         ValueError: a wrong number of gimbal angles, or ones for which there is no analysis.
     """
     scenario = _as_run(scenario, None, None)
+    _tell_implausible(scenario)
     return Study(scenario, _gimbal_angles(scenario, gimbal_angle))
 
 
@@ -222,6 +254,7 @@ def jitter(scenario: Scenario | str, gimbal_angle: ArrayLike | None = None) -> J
         ResonanceError: an order of a rotor lies on an undamped mode.
     """
     scenario = _as_run(scenario, None, None)
+    _tell_implausible(scenario)
     return JitterStudy(scenario, _gimbal_angles(scenario, gimbal_angle))
 
 
@@ -246,6 +279,8 @@ def platforms(
         ResonanceError: an order of a rotor lies on an undamped mode.
     """
     loaded = tuple(_as_run(scenario, None, None) for scenario in scenarios)
+    for each in loaded:
+        _tell_implausible(each)
     given: list[Any] = [None] * len(loaded) if gimbal_angles is None else list(gimbal_angles)
     if len(given) != len(loaded):
         raise ValueError(
@@ -322,6 +357,7 @@ def linearize(
     scenario = _as_run(scenario, mount, None)
     if actuator not in ("servo", "ideal"):
         raise ValueError(f"actuator must be 'servo' or 'ideal', got {actuator!r}")
+    _tell_implausible(scenario)
     return linearize_satellite(
         build_satellite(scenario),
         OperatingPoint(
@@ -331,6 +367,11 @@ def linearize(
         actuator,
         {name: _vector(f"points[{name!r}]", p, 3) for name, p in (points or {}).items()},
     )
+
+
+def _tell_implausible(scenario: Scenario) -> None:
+    for note in implausible(scenario):
+        warnings.warn(note, ImplausibleValue, stacklevel=3)
 
 
 def _aliased(scenario: Scenario, run: xr.Dataset) -> str:

@@ -37,7 +37,7 @@ from quietbus.build import build_satellite
 from quietbus.dynamics.vibration import NOTHING_SEEN, Vibration
 from quietbus.model.satellite import Satellite
 from quietbus.scenario import Scenario, ScenarioError
-from quietbus.solve.harmonic import refuse_resonance
+from quietbus.solve.harmonic import ResonanceError, refuse_resonance
 from quietbus.solve.noise import Broadband, noise_spectra
 
 MOUNTS = ("isolated", "rigid")
@@ -366,6 +366,35 @@ class JitterStudy:
 def worst_case_norm(amplitude: np.ndarray) -> np.ndarray:
     """Norm over the axes of the sum of all amplitudes, for amplitudes (n, cmg, order, axis)."""
     return np.linalg.norm(np.sum(np.abs(amplitude), axis=(1, 2)), axis=-1)
+
+
+def worst_over_phases(
+    scenario: Scenario,
+    mount: str,
+    gimbal_angle: np.ndarray,
+    rotor_speed: np.ndarray | None = None,
+) -> np.ndarray | None:
+    """(3,) bus rate [rad/s] with the worst rotor phases: the sum of all lines' amplitudes.
+
+    At rest, as of ``JitterStudy``; None where there is no such steady motion.
+
+    Args:
+        gimbal_angle: (cmg,) [rad].
+        rotor_speed: (cmg,) [rad/s], instead of the scenario's own.
+    """
+    satellite = build_satellite(scenario, mount)  # type: ignore[arg-type]
+    if rotor_speed is not None:
+        speed = jnp.asarray(rotor_speed)
+        satellite = eqx.tree_at(lambda s: s.cluster.rotor_speed, satellite, speed)
+    outputs, small = _compute([satellite], gimbal_angle[None])
+    small = jax.tree.map(lambda leaf: leaf[0], small)
+    if rest_error(small) > AT_REST:
+        return None
+    try:
+        refuse_resonance(satellite, "", np.linalg.eigvals(small.state_matrix()))
+    except ResonanceError:
+        return None
+    return np.sum(np.abs(outputs["bus_rate"][0]), axis=(0, 1))
 
 
 def ratio(isolated: np.ndarray, rigid: np.ndarray) -> dict[str, list[float | None]]:

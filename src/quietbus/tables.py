@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
+from rich.text import Text
+
+from quietbus.scenario.as_read import as_read
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -15,6 +18,7 @@ if TYPE_CHECKING:
 
     from quietbus.measured import WaterfallFit
     from quietbus.results import Summary
+    from quietbus.scenario import Scenario
     from quietbus.study import Study
     from quietbus.validate import Check
 
@@ -25,6 +29,17 @@ Ranges = tuple[tuple[float, float | None], ...]
 
 def _titled(title: str) -> Table:
     return Table(title=title, box=SIMPLE_HEAD, title_justify="left")
+
+
+def as_read_table(scenario: Scenario) -> Table:
+    """The main values of a scenario in usual units."""
+    table = Table(box=None, show_header=False, title_justify="left")
+    table.title = Text(f"{scenario.name}, as read")
+    table.add_column()
+    table.add_column(overflow="fold")
+    for part, values in as_read(scenario):
+        table.add_row(part, Text(values))
+    return table
 
 
 def summary_table(summaries: Mapping[str, Summary]) -> Table:
@@ -47,11 +62,15 @@ def summary_table(summaries: Mapping[str, Summary]) -> Table:
             cells.append(f"{100 * values[0] / values[1]:.3g} %" if known else "")
         table.add_row(name, unit, *cells)
 
-    for name, field in (
+    rates = [
         ("rate jitter {}, peak", "residual_rate"),
         ("rate jitter {}, RMS", "residual_rate_rms"),
+        ("  {} steady, worst rotor phases", "worst_phases_rate"),
         ("slow rate {}, peak", "slow_rate"),
-    ):
+    ]
+    if all(summary.worst_phases_rate is None for summary in summaries.values()):
+        del rates[2]
+    for name, field in rates:
         for i, axis in enumerate(AXES):
             value = lambda s, i=i, field=field: _degrees(getattr(s, field), i)  # noqa: E731
             row(name.format(axis), "deg/s", value, ratio=field != "slow_rate")
@@ -65,6 +84,9 @@ def summary_table(summaries: Mapping[str, Summary]) -> Table:
     row("largest strut stroke", "mm", lambda s: 1e3 * s.peak_stroke)
     row("largest strut force", "N", lambda s: s.peak_strut_force)
     row("least singularity measure", "-", lambda s: s.minimum_singularity)
+    row("control torque asked for, peak", "N m", lambda s: s.peak_control_torque)
+    if first.minimum_torque_share is not None:
+        row("  least share of it delivered", "%", lambda s: 100.0 * _known(s.minimum_torque_share))
     return table
 
 

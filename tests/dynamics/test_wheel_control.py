@@ -58,7 +58,7 @@ def test_wheels_of_unlike_torque_limits_share_by_them():
     np.testing.assert_allclose(-torque @ axes, found.torque_B, rtol=1e-9)
     null = np.linalg.svd(axes.T)[2][-1]
     assert abs((torque / limit**2) @ null) < 1e-12
-    assert float(found.torque_share) == 1.0
+    assert float(found.torque_share) == pytest.approx(1.0, rel=1e-12)
 
 
 def test_torque_limit_cuts_all_wheels_alike_and_the_integrator_knows():
@@ -77,7 +77,9 @@ def test_wheel_at_its_speed_limit_gives_only_torque_that_slows_it():
     outward = (100.0 * np.sign(whole)).tolist()
     found, torque, _ = _decide(top=[100.0] * 4, speed=[outward[0], -outward[1], 0.0, 50.0])
     np.testing.assert_allclose(torque, [0.0, *whole[1:]], rtol=1e-9)
-    missing = np.asarray(found.torque_B) + torque @ axes
+    asked, delivered = np.asarray(found.torque_B), -torque @ axes
+    missing = asked - delivered
     assert np.linalg.norm(missing) > 0.1
+    assert float(found.torque_share) == pytest.approx(delivered @ asked / (asked @ asked))
     unwound = np.asarray(found.attitude_error_B) + missing / (0.1 * np.sqrt(2500.0 / 0.1))
     np.testing.assert_allclose(found.integral_rate, unwound, rtol=1e-9)

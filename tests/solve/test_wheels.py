@@ -32,7 +32,7 @@ def test_limits_that_a_run_meets_are_told_with_their_times():
     first = time[np.argmax(speed[:, wheel] > (1 - 1e-6) * limit)]
     assert any(f"wheel {wheel} reached its speed limit" in note for note in notes)
     assert any(f"at t = {first:.4g} s" in note for note in notes)
-    assert any("torque limit cut the torque to" in note for note in notes)
+    assert any("limits cut the torque to" in note for note in notes)
     assert run.attrs["status"] == "complete"
     summary = summarize(run)
     np.testing.assert_allclose(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
@@ -78,38 +79,45 @@ class Asked:
 
 
 def load(
-    name: str, mount: Mount | None, duration: str | None, output_rate: str | None = None
+    name: str,
+    mount: Mount | None,
+    duration: str | None,
+    output_rate: str | None = None,
+    gimbal_angles: str | None = None,
 ) -> Scenario:
-    """The scenario with the command line's values instead of its own."""
+    """The scenario with the command line's values instead of its own; what is odd in it is told."""
     from quietbus.scenario import load_scenario
+    from quietbus.scenario.plausibility import implausible
 
+    angles = gimbal_angles and [angle.strip() for angle in gimbal_angles.split(",")]
     given = {
         "isolator.mount": ("--mount", mount and mount.value),
         "simulation.duration": ("--duration", duration),
         "simulation.output_rate": ("--output-rate", output_rate),
+        "cluster.gimbal_angles": ("--gimbal-angles", angles),
     }
     given = {path: said for path, said in given.items() if said[1] is not None}
     scenario = load_scenario(name)
     Asked.file, Asked.names = name, (scenario.name, f"{scenario.name} with overrides")
     Asked.options = {path: option for path, (option, _) in given.items()}
-    return scenario.with_overrides({path: value for path, (_, value) in given.items()})
-
-
-def at_angles(scenario: Scenario, gimbal_angles: str | None) -> Scenario:
-    if gimbal_angles is None:
-        return scenario
-    angles = [angle.strip() for angle in gimbal_angles.split(",")]
-    Asked.options = Asked.options | {"cluster.gimbal_angles": "--gimbal-angles"}
-    return scenario.with_overrides({"cluster.gimbal_angles": angles})
+    scenario = scenario.with_overrides({path: value for path, (_, value) in given.items()})
+    for note in implausible(scenario):
+        print(f"note: {note}", file=sys.stderr)
+    return scenario
 
 
 def speed(text: str) -> float:
     """A positive angular velocity [rad/s]."""
     from pydantic_core import PydanticCustomError
 
+    from quietbus.scenario.plausibility import unlikely_speed
     from quietbus.scenario.units import Quantity
 
     try:
-        return Quantity("an angular velocity", "rad/s", above=0.0).read(text)
+        read = Quantity("an angular velocity", "rad/s", above=0.0).read(text)
     except PydanticCustomError as error:
         raise BadInput(f"--max-speed: {error}") from None
+    note = unlikely_speed(read)
+    if note:
+        print(f"note: --max-speed: read as {note}", file=sys.stderr)
+    return read

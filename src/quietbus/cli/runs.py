@@ -26,6 +26,7 @@ from quietbus.cli.session import (
     notes,
     print_table,
     progress,
+    show_as_read,
 )
 from quietbus.cli.written import save
 from quietbus.words import file_name
@@ -69,6 +70,7 @@ def simulate(
         raise BadInput("--joint-forces needs --method direct")
     if joint_forces and chosen == Mount.rigid:
         raise BadInput("--joint-forces needs the isolated mount: a rigid one leaves them open")
+    show_as_read(checked)
     import_heavy()
     from quietbus import api
     from quietbus.results import summarize
@@ -99,7 +101,7 @@ def simulate(
         if not troubles and run.attrs["status"] != "interrupted":
             checkpoint.unlink(missing_ok=True)
     if run.sizes["time"] > 1:
-        print_table(summary_table({chosen: summarize(run)}))
+        print_table(summary_table({chosen: summarize(run, api.worst_over_phases(run))}))
     else:
         print("one instant only, so there is no table")
     if run.attrs["status"] != "complete":
@@ -170,7 +172,9 @@ def compare(
         print(f"no pictures of an interrupted comparison; `quietbus plot {output}/isolated.nc`")
         troubles.append("the same command with --resume goes on from there")
     elif all(run.sizes["time"] > 1 for run in runs.values()):
-        summaries = {str(mount): summarize(run) for mount, run in runs.items()}
+        summaries = {
+            str(mount): summarize(run, api.worst_over_phases(run)) for mount, run in runs.items()
+        }
         print_table(summary_table(summaries))
         numbers = {mount: summary.to_dict() for mount, summary in summaries.items()}
         write_json(output / "summary.json", numbers)

@@ -12,7 +12,7 @@ import typer
 from quietbus.cli.app import app
 from quietbus.cli.given import Mount, ScenarioArgument, load
 from quietbus.cli.guard import BadInput, check_file, fail
-from quietbus.cli.session import import_heavy, print_table, status
+from quietbus.cli.session import import_heavy, print_table, show_as_read, status
 from quietbus.writing import write_text
 
 if TYPE_CHECKING:
@@ -46,6 +46,7 @@ def validate(
     checked = load(scenario, mount, None)
     if export is not None:
         check_file(export, "MuJoCo model (XML)")
+    show_as_read(checked)
     from quietbus.tables import checks_table
 
     try:

@@ -16,6 +16,8 @@ from quietbus.words import visible_lines
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from quietbus.scenario import Scenario
+
 
 class Stop:
     """What Ctrl-C and SIGTERM do: a flag, since an exception amid JAX would be lost or worse."""
@@ -51,7 +53,10 @@ def import_heavy() -> None:
         with status() as tell:
             tell("loading JAX")
             import quietbus.api
-    import quietbus.api  # noqa: F401
+    import quietbus.api
+
+    # what is odd in a scenario has been told when it was read
+    warnings.simplefilter("ignore", quietbus.api.ImplausibleValue)
 
 
 @contextmanager
@@ -128,3 +133,10 @@ def print_table(table: Table) -> None:
     from rich.console import Console
 
     Console(markup=False, emoji=False).print(table)
+
+
+def show_as_read(scenario: Scenario) -> None:
+    """The main values that a command goes by."""
+    from quietbus.tables import as_read_table
+
+    print_table(as_read_table(scenario))

@@ -17,12 +17,11 @@ from quietbus.cli.given import (
     Method,
     Mount,
     ScenarioArgument,
-    at_angles,
     load,
     speed,
 )
 from quietbus.cli.guard import BadInput, fail, make_folder
-from quietbus.cli.session import import_heavy, notes, print_table, progress, status
+from quietbus.cli.session import import_heavy, notes, print_table, progress, show_as_read, status
 from quietbus.cli.written import write_study
 
 if TYPE_CHECKING:
@@ -40,9 +39,10 @@ def analyze(
     gimbal_angles: AnglesOption = None,
 ) -> None:
     """Modes, isolator channels, gain range and margins: per axis and of the whole satellite."""
-    checked = at_angles(load(scenario, None, None), gimbal_angles)
+    checked = load(scenario, None, None, gimbal_angles=gimbal_angles)
     if not as_json:
         make_folder(output, "analysis.json")
+        show_as_read(checked)
     import_heavy()
     from quietbus import api
     from quietbus.dynamics.linearize import OperatingPointError
@@ -78,10 +78,11 @@ def jitter(
     ] = None,
 ) -> None:
     """Jitter at each rotor order with the isolator and without, and over the rotors' speed."""
-    checked = at_angles(load(scenario, None, None), gimbal_angles)
+    checked = load(scenario, None, None, gimbal_angles=gimbal_angles)
     most = None if max_speed is None else speed(max_speed)
     if not as_json:
         make_folder(output, "jitter.json")
+        show_as_read(checked)
     import_heavy()
     from quietbus import api
 
@@ -131,6 +132,7 @@ def verify(
         raise BadInput(f"{scenario}: requirements: {NO_REQUIREMENTS}")
     if not as_json:
         make_folder(output, "verification.json")
+        show_as_read(checked)
     import_heavy()
     from quietbus import api
     from quietbus.solve.harmonic import ResonanceError

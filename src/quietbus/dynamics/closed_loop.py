@@ -32,9 +32,8 @@ class ControlSignals(eqx.Module):
     gimbal_rate_command: Float[Array, " cmg"]  # [rad/s] within the rate limit
     gimbal_acceleration: Float[Array, " cmg"]  # [rad/s^2]
     singularity: Float[Array, ""]  # [-]
-    # where rotor speeds change:
-    rotor_acceleration: Float[Array, " cmg"] | None = None  # [rad/s^2]
-    torque_share: Float[Array, ""] | None = None  # [-] left by the wheels' torque limits
+    rotor_acceleration: Float[Array, " cmg"] | None = None  # [rad/s^2], where speeds change
+    torque_share: Float[Array, ""] | None = None  # [-] as of ``share_along``, where units act
 
 
 def rotor_angles(satellite: Satellite, t: Float[Array, ""], state: State) -> Float[Array, " cmg"]:
@@ -69,6 +68,12 @@ def torque_axes(
     return (momentum[:, None] * R_PG[:, :, 1]).T / h_rms, h_rms
 
 
+def share_along(delivered: Float[Array, "3"], asked: Float[Array, "3"]) -> Float[Array, ""]:
+    """Part of a torque that is delivered along its own direction; 1 where nothing is asked."""
+    square = asked @ asked
+    return jnp.where(square > 0.0, delivered @ asked / jnp.where(square > 0.0, square, 1.0), 1.0)
+
+
 def control_signals(satellite: Satellite, t: Float[Array, ""], state: State) -> ControlSignals:
     """Controller, steering and gimbal servo at time t [s]."""
     reference = satellite.guidance.reference(t)
@@ -100,13 +105,15 @@ def control_signals(satellite: Satellite, t: Float[Array, ""], state: State) -> 
             if isinstance(drive, WheelMotors):
                 assert rotor is not None
                 wheel_torque = drive.weights * command
-                torque_share = drive.share(wheel_torque)
-                wheel_torque = drive.within_speed(torque_share * wheel_torque, rotor.speed)
+                wheel_torque = drive.share(wheel_torque) * wheel_torque
+                wheel_torque = drive.within_speed(wheel_torque, rotor.speed)
                 delivered = -R_BP @ A @ (wheel_torque / drive.weights)
+                torque_share = share_along(delivered, torque)
                 rotor_acceleration = wheel_torque / satellite.cluster.I_RRcm_R[:, 0, 0]
             else:
                 share = satellite.servo.share(command)
                 rate_command, delivered = share * command, share * torque
+                torque_share = share_along(-h_rms * (R_BP @ A @ rate_command), torque)
         integral_rate = controller.integral_rate(error, asked, delivered)
     acceleration = satellite.servo.acceleration(rate_command, state.gimbal_rate)
     if satellite.motor is not None:

@@ -34,11 +34,11 @@ class Outputs(eqx.Module):
     attitude_error: Float[Array, "3"]
     singularity_measure: Float[Array, ""]
     joint_forces: JointForces | None
+    torque_share: Float[Array, ""] | None = None  # where the control makes units act
     # where rotor speeds change:
     rotor_angle: Float[Array, " cmg"] | None = None
     rotor_speed: Float[Array, " cmg"] | None = None
     rotor_torque: Float[Array, " cmg"] | None = None
-    torque_share: Float[Array, ""] | None = None  # of wheels under control
 
 
 def outputs(
@@ -80,10 +80,10 @@ def outputs(
         attitude_error=signals.attitude_error_B,
         singularity_measure=signals.singularity,
         joint_forces=joints,
+        torque_share=signals.torque_share,
         rotor_angle=None if state.rotor is None else state.rotor.angle,
         rotor_speed=None if state.rotor is None else state.rotor.speed,
         rotor_torque=torque,
-        torque_share=signals.torque_share,
     )
 
 

@@ -13,6 +13,7 @@ from quietbus.dynamics.outputs import Outputs
 from quietbus.results.origin import rotors
 from quietbus.results.schema import (
     COMBINED,
+    CONTROL_VARIABLES,
     DIMENSIONS,
     JITTER_VARIABLES,
     JOINT_VARIABLES,
@@ -48,7 +49,7 @@ def to_dataset(
     }
     data |= {
         name: _variable(getattr(solution.outputs, name), *description)
-        for name, description in ROTOR_VARIABLES.items()
+        for name, description in (CONTROL_VARIABLES | ROTOR_VARIABLES).items()
         if getattr(solution.outputs, name) is not None
     }
     joints = solution.outputs.joint_forces

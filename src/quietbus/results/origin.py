@@ -9,7 +9,11 @@ from quietbus.scenario.wheels import WheelCluster
 
 def scenario_of(run: xr.Dataset) -> Scenario:
     """The scenario that a run was made from."""
-    return Scenario.from_yaml(run.attrs["scenario"], source="the run's scenario")
+    scenario = Scenario.from_yaml(run.attrs["scenario"], source="the run's scenario")
+    if "rotor_phases" in scenario.cluster.model_fields_set:
+        return scenario
+    # a run now says them always; one made before they were random by default had zeros
+    return scenario.with_overrides({"cluster.rotor_phases": [0.0] * scenario.cluster.count})
 
 
 def has_gimbals(run: xr.Dataset) -> bool:

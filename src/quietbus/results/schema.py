@@ -36,12 +36,15 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
         "sqrt(det(A A^T)) of the cluster's torque directions, weighted by momentum",
     ),
 }
+# of runs in which the control makes units act
+CONTROL_VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
+    "torque_share": ((), "1", "part of the control torque that is delivered along it"),
+}
 # of runs whose rotor speeds change
 ROTOR_VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "rotor_angle": (("cmg",), "rad", "rotor angles"),
     "rotor_speed": (("cmg",), "rad/s", "rotor speeds, relative to the unit's body"),
     "rotor_torque": (("cmg",), "N m", "torque of the motor on its rotor"),
-    "torque_share": ((), "1", "part of the torque asked for that the wheels' limits leave"),
 }
 JOINT_VARIABLES = {
     "spherical_force": (

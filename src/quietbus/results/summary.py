@@ -18,6 +18,7 @@ class Summary:
 
     residual_rate: np.ndarray | None  # (3,) [rad/s] peak jitter per axis at the end of the run
     residual_rate_rms: np.ndarray | None  # (3,) [rad/s]
+    worst_phases_rate: np.ndarray | None  # (3,) [rad/s] the lines' peak, any rotor phases
     slow_rate: np.ndarray | None  # (3,) [rad/s] peak of the slow motion in the same window
     residual_note: str  # over which time, or why there is none
     pointing_error: float  # [rad] largest norm of the attitude error in the last second
@@ -25,6 +26,8 @@ class Summary:
     peak_stroke: float  # [m]
     peak_strut_force: float  # [N]
     minimum_singularity: float  # [-]
+    peak_control_torque: float  # [N m] asked for
+    minimum_torque_share: float | None  # [-] of it that was delivered, where units act
     rotor_speeds: np.ndarray | None  # (2,) [rad/s] least and largest, where speeds change
     peak_rotor_torque: float | None  # [N m] likewise
 
@@ -34,8 +37,13 @@ class Summary:
         return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in fields}
 
 
-def summarize(run: xr.Dataset) -> Summary:
-    """The numbers of a run (see ``Summary``)."""
+def summarize(run: xr.Dataset, worst_phases_rate: np.ndarray | None = None) -> Summary:
+    """The numbers of a run (see ``Summary``).
+
+    Args:
+        worst_phases_rate: of a direct run, as of ``quietbus.worst_over_phases``, which computes
+            it; a harmonic run knows it.
+    """
     time = run["time"].to_numpy()
     peak = lambda name: float(np.max(np.abs(run[name].to_numpy())))  # noqa: E731
     error = np.linalg.norm(run["attitude_error"].to_numpy(), axis=1)
@@ -46,6 +54,7 @@ def summarize(run: xr.Dataset) -> Summary:
         jitter = run["bus_rate_jitter_envelope"].to_numpy()[last].max(axis=0)
         rms = run["bus_rate_jitter_rms"].to_numpy()[last].max(axis=0)
         slow = np.abs(run["bus_rate"].to_numpy()[last]).max(axis=0)
+        worst_phases_rate = run["bus_rate_jitter_worst_case"].to_numpy()[last].max(axis=0)
         note = f"envelope from t = {time[last][0]:.4g} s to {time[-1]:.4g} s"
         if "bus_rate_noise_rms" in run:
             note += "; the rotors' noise is in the RMS alone"
@@ -61,6 +70,7 @@ def summarize(run: xr.Dataset) -> Summary:
     return Summary(
         residual_rate=jitter,
         residual_rate_rms=rms,
+        worst_phases_rate=worst_phases_rate,
         slow_rate=slow,
         residual_note=note,
         pointing_error=float(np.max(error[time >= time[-1] - 1.0])),
@@ -68,6 +78,8 @@ def summarize(run: xr.Dataset) -> Summary:
         peak_stroke=peak("leg_stroke"),
         peak_strut_force=peak("leg_force"),
         minimum_singularity=float(run["singularity_measure"].min()),
+        peak_control_torque=float(np.max(np.linalg.norm(run["control_torque"].to_numpy(), axis=1))),
+        minimum_torque_share=float(run["torque_share"].min()) if "torque_share" in run else None,
         rotor_speeds=np.array([speed.min(), speed.max()]) if changing else None,
         peak_rotor_torque=peak("rotor_torque") if changing else None,
     )
@@ -99,10 +111,10 @@ def rotor_notes(run: xr.Dataset) -> list[str]:
             )
     if "torque_share" in run:
         share = run["torque_share"].to_numpy()
-        cut = time[share < 1.0]
+        cut = time[share < 1.0 - 1e-6]
         if cut.size:
             said.append(
-                f"the wheels' torque limit cut the torque to {100 * share.min():.3g} % of what was "
+                f"the wheels' limits cut the torque to {100 * share.min():.3g} % of what was "
                 f"asked for at the least, first at t = {cut[0]:.4g} s, in "
                 f"{100 * cut.size / time.size:.3g} % of the outputs"
             )
