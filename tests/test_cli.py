@@ -66,6 +66,27 @@ def test_compare_puts_both_mounts_side_by_side_with_pictures(command, tmp_path):
         assert summary[mount] == expected
 
 
+@pytest.mark.parametrize("given", ["30, 30, 30, 30", "30 deg, 30 deg, 30 deg, 30 deg"])
+def test_odd_values_are_told_and_all_are_shown_as_read(command, given):
+    status, out, err = command("analyze", "zhang2012", "--gimbal-angles", given)
+    assert status == 0
+    assert "15 N m s at 6000 rpm, rotor 6 kg" in out
+    told = "note: cluster.gimbal_angles[0]: read as 30 rad, 1719 deg: more than a whole turn"
+    assert (told in err) == ("deg" not in given)
+    assert err.count("read as") == ("deg" not in given)
+    assert f"gimbals       at {30 if 'deg' in given else 1719} deg" in out
+
+
+def test_json_has_nothing_beside_it_and_a_slip_is_told_before_what_comes_of_it(command, tmp_path):
+    status, out, err = command("analyze", "zhang2012", "--gimbal-angles", "7, 0, 0, 0", "--json")
+    assert status == 0
+    json.loads(out)
+    assert "gimbal_angles[0]: read as 7 rad, 401.1 deg" in err
+    path = short(tmp_path, **{"1.3600000000000002e-05": "1.36"})
+    status, out, err = command("jitter", path)  # refused, since nothing rests on such a rotor
+    assert "note: cluster.rotor.static_imbalance: read as 136000 g cm: a mass centre 227 mm" in err
+
+
 def test_plot_draws_a_run(command, tmp_path):
     qb.save_run(qb.simulate("zhang2012", duration=0.3), tmp_path / "run.nc")
     status, out, _ = command("plot", "run.nc", "--format", "svg")

@@ -46,13 +46,13 @@ def validate(
     checked = load(scenario, mount, None)
     if export is not None:
         check_file(export, "MuJoCo model (XML)")
-    show_as_read(checked)
     from quietbus.tables import checks_table
 
     try:
         checks = checks_of(checked, export)
     except ImportError as error:
         fail(str(error))
+    show_as_read(checked)
     print_table(checks_table(f"{checked.name}, {checked.isolator.mount}", checks))
     fail_unless_passed(checks)
     print(f"all {len(checks)} checks passed (errors are relative)")

@@ -42,7 +42,6 @@ def analyze(
     checked = load(scenario, None, None, gimbal_angles=gimbal_angles)
     if not as_json:
         make_folder(output, "analysis.json")
-        show_as_read(checked)
     import_heavy()
     from quietbus import api
     from quietbus.dynamics.linearize import OperatingPointError
@@ -61,6 +60,7 @@ def _print_analysis(study: Study, output: Path) -> None:
     from quietbus.plots import analysis_figures
     from quietbus.tables import analysis_tables
 
+    show_as_read(study.scenario)
     for part in analysis_tables(study):
         print(part) if isinstance(part, str) else print_table(part)
     write_study("analysis", study.to_dict(), lambda: analysis_figures(study), output)
@@ -82,7 +82,6 @@ def jitter(
     most = None if max_speed is None else speed(max_speed)
     if not as_json:
         make_folder(output, "jitter.json")
-        show_as_read(checked)
     import_heavy()
     from quietbus import api
 
@@ -98,6 +97,7 @@ def jitter(
         return
     from quietbus.tables import jitter_tables
 
+    show_as_read(checked)
     for table in jitter_tables(numbers):
         print_table(table)
     write_study("jitter", numbers, lambda: _jitter_pictures(study, most), output)
@@ -132,7 +132,6 @@ def verify(
         raise BadInput(f"{scenario}: requirements: {NO_REQUIREMENTS}")
     if not as_json:
         make_folder(output, "verification.json")
-        show_as_read(checked)
     import_heavy()
     from quietbus import api
     from quietbus.solve.harmonic import ResonanceError
@@ -153,6 +152,7 @@ def verify(
         from quietbus.plots import pointing_figures
         from quietbus.tables import verification_tables
 
+        show_as_read(checked)
         for part in verification_tables(numbers):
             print(part) if isinstance(part, str) else print_table(part)
         write_study("verification", numbers, lambda: pointing_figures(verification), output)
