@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from quietbus.results import VARIABLES
+from quietbus.results.schema import DIMENSIONS, VARIABLES
 from quietbus.scenario import load_scenario
 
 SLOW, ROTOR = 1e-3, 100.0  # [rad/s], [Hz]
@@ -56,7 +56,12 @@ def synthetic(
         "wall_time_s": 12.345,
         "created": "2012-03-04T05:06:07+00:00",
     }
-    return xr.Dataset(data, {"time": time}, attributes)
+    for name in ("bus_attitude", "attitude_error", "bus_rate"):
+        data[name] += ({"units": VARIABLES[name][1], "long_name": VARIABLES[name][2]},)
+    data["platform_attitude"] = data["bus_attitude"]
+    labels = {name: values for name, (_, values, _) in DIMENSIONS.items()}
+    labels |= {"cmg": np.arange(cmgs), "leg": np.arange(legs)}
+    return xr.Dataset(data, {"time": time} | labels, attributes)
 
 
 def harmonic():

@@ -20,6 +20,7 @@ from quietbus.results.schema import (
     PAIRS,
     ROTOR_VARIABLES,
     VARIABLES,
+    per_hertz,
 )
 from quietbus.scenario import Scenario
 from quietbus.solve.direct import SLOW, Scheme, Solution
@@ -160,7 +161,7 @@ def _jitter_variables(frequency: np.ndarray, angle: np.ndarray, jitter: Jitter) 
             data[f"{name}_psd"] = (
                 ("look", "frequency", "cmg", *inner),
                 psd,
-                {"units": _per_hertz(unit), "long_name": f"{of}: one-sided PSD by rotor noise"},
+                {"units": per_hertz(unit), "long_name": f"{of}: one-sided PSD by rotor noise"},
             )
             square = jitter.broadband.variance(name, len(values))
             combined = combined.with_noise(square.reshape(len(values), -1))
@@ -175,16 +176,12 @@ def _jitter_variables(frequency: np.ndarray, angle: np.ndarray, jitter: Jitter) 
             ("look", "frequency", "cmg", "line", "pair"),
             jitter.broadband.cospectrum,
             {
-                "units": _per_hertz("rad"),
+                "units": per_hertz("rad"),
                 "long_name": "real part of the one-sided cross-spectrum of two components of a "
                 "line of sight's jitter by rotor noise",
             },
         )
     return data
-
-
-def _per_hertz(unit: str) -> str:
-    return f"({unit})^2/Hz"
 
 
 def _ripple_variables(

@@ -1,20 +1,25 @@
 """Files of runs: written, read and checked."""
 
 import contextlib
+import hashlib
 import io
 import os
 import pathlib
 import warnings
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, BinaryIO
 
 import h5netcdf
+import h5py
 import xarray as xr
 
 from quietbus.results.characters import as_characters
 from quietbus.results.checkpoint import is_checkpoint, read, to_run
-from quietbus.results.schema import VARIABLES
+from quietbus.results.checks import check_file_parts, check_heaps, check_run
 from quietbus.writing import replacing
+
+# behind the end of what HDF5 reads, with the hash of all before; who changes the file cuts it off
+SEAL = b"quietbus seal 1\n"
 
 
 def save_run(run: xr.Dataset, path: str | os.PathLike[str]) -> None:
@@ -29,6 +34,31 @@ def save_run(run: xr.Dataset, path: str | os.PathLike[str]) -> None:
             as_characters(run).dump_to_store(xr.backends.H5NetCDFStore(stored))
         if disk.refused is not None:
             raise disk.refused
+        file.seek(0, os.SEEK_END)
+        file.write(SEAL + _digest(file, file.tell()))
+
+
+def _digest(file: BinaryIO, size: int) -> bytes:
+    """Hash of the first bytes of a file, whose place is then behind them."""
+    digest = hashlib.blake2b(digest_size=16)
+    file.seek(0)
+    while size:
+        part = file.read(min(size, 1 << 20))
+        if not part:
+            break
+        digest.update(part)
+        size -= len(part)
+    return digest.digest()
+
+
+def _refuse_broken_seal(file: BinaryIO, size: int) -> None:
+    """Tell a file that is not as ``save_run`` wrote it; one changed by HDF5's tools has no seal."""
+    inner = size - len(SEAL) - 16
+    if inner <= 0:
+        return
+    file.seek(inner)
+    if file.read(len(SEAL)) == SEAL and file.read(16) != _digest(file, inner):
+        raise ValueError("its checksum is wrong: it was damaged since it was written")
 
 
 class _Disk(io.RawIOBase):
@@ -113,23 +143,40 @@ def load_run(path: str | os.PathLike[str]) -> xr.Dataset:
 
     Raises:
         FileNotFoundError: no such file.
-        ValueError: the file is not a run of quietbus.
+        ValueError: the file is not a run of quietbus, or a damaged one; the message says what of
+            it is wrong.
     """
-    if pathlib.Path(path).is_dir():
+    path = pathlib.Path(path)
+    if path.is_dir():
         raise ValueError(f"{path}: is a folder; expected the file of a run")
-    if not pathlib.Path(path).is_file():
+    if not path.exists():
         raise FileNotFoundError(f"{path}: no such file")
-    if is_checkpoint(path):
-        return to_run(read(path), str(path))
+    if not path.is_file():
+        raise ValueError(f"{path}: is a pipe, socket or device; expected the file of a run")
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of xarray, about files that are no runs anyway
-            with xr.open_dataset(path, engine="h5netcdf") as stored:
-                run = stored.load()
-    except (OSError, ValueError, KeyError) as error:
-        raise ValueError(f"{path}: not a NetCDF-4 file ({error})") from None
-    missing = {"time", *VARIABLES} - set(run.variables) or {"scenario", "mount"} - set(run.attrs)
-    if missing:
-        listed = ", ".join(sorted(missing))
-        raise ValueError(f"{path}: a NetCDF file, but not a run of quietbus: it has no {listed}")
+        run = to_run(read(path), str(path)) if is_checkpoint(path) else _load(path)
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read: {error.strerror}") from None
+    try:
+        check_run(run)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
     return run
+
+
+def _load(path: pathlib.Path) -> xr.Dataset:
+    """All of a NetCDF-4 file in memory."""
+    size = path.stat().st_size
+    try:
+        with path.open("rb") as file:
+            _refuse_broken_seal(file, size)
+            check_heaps(file, size)
+        with path.open("rb") as file, h5py.File(file, "r") as stored:
+            check_file_parts(stored, size)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # of xarray, about files that are no runs anyway
+                with xr.open_dataset(path, engine="h5netcdf") as opened:
+                    return opened.load()
+    except Exception as error:  # the readers of damaged files raise whatever they stumble over
+        told = " ".join(str(error).split())[:200] or type(error).__name__
+        raise ValueError(f"{path}: not a NetCDF-4 file ({told})") from None

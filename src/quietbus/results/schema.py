@@ -80,3 +80,34 @@ COMBINED = {
     "rss": "root of the sum of squares of all amplitudes",
     "rms": "root mean square in time, phases as given",
 }
+
+
+def described(name: str) -> tuple[tuple[str, ...], str] | None:
+    """Dimensions and unit of a variable by its name, None of one that no run has."""
+    for table in (VARIABLES, ROTOR_VARIABLES, JOINT_VARIABLES):
+        if name in table:
+            inner, unit, _ = table[name]
+            return ("time", *inner), unit
+    if name == "jitter_change_error":
+        return ("time",), "1"
+    if name == "line_of_sight_cospectrum":
+        return ("look", "frequency", "cmg", "line", "pair"), per_hertz("rad")
+    for of, (inner, unit, _) in JITTER_VARIABLES.items():
+        parts: dict[str, tuple[tuple[str, ...], str]] = {
+            "jitter_amplitude": (("time", "cmg", "order", *inner), unit),
+            "jitter_phase": (("time", "cmg", "order", *inner), "rad"),
+            "ripple_amplitude": (("time", "cmg", "ripple", *inner), unit),
+            "ripple_phase": (("time", "cmg", "ripple", *inner), "rad"),
+            "psd": (("look", "frequency", "cmg", *inner), per_hertz(unit)),
+            "noise_rms": (("time", *inner), unit),
+        }
+        parts |= {f"jitter_{kind}": (("time", *inner), unit) for kind in COMBINED}
+        part = name.removeprefix(f"{of}_")
+        if part != name and part in parts:
+            return parts[part]
+    return None
+
+
+def per_hertz(unit: str) -> str:
+    """Unit of a power spectral density."""
+    return f"({unit})^2/Hz"
