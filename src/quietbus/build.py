@@ -77,7 +77,7 @@ def build_satellite(
         loads=tuple(_load(load) for load in scenario.loads),
         mount=mount or isolator.mount,
         disturbance=_disturbance(cluster, first_unit),
-        motor=_gimbal_motor(cluster),
+        motor=_gimbal_motor(cluster, first_unit),
     )
     if scenario.control is None:
         return satellite
@@ -269,7 +269,9 @@ def _spectra(disturbance: scenario_disturbance.Disturbance | None) -> Spectra:
     return radial, axial, rocking, about
 
 
-def _gimbal_motor(cluster: scenario_hardware.Cluster | WheelCluster) -> GimbalMotor | None:
+def _gimbal_motor(
+    cluster: scenario_hardware.Cluster | WheelCluster, first_unit: int
+) -> GimbalMotor | None:
     motor = cluster.gimbal_motor
     if motor is None or isinstance(cluster, WheelCluster):
         return None
@@ -277,13 +279,15 @@ def _gimbal_motor(cluster: scenario_hardware.Cluster | WheelCluster) -> GimbalMo
     steps = stepping.steps_per_turn if stepping else 1
     harmonic = 1 + np.arange(stepping.harmonics if stepping else 0)
     holding = motor.holding_bandwidth
+    phases = [motor.phases(seed, j) for j, seed in enumerate(cluster.seeds, first_unit)]
     return GimbalMotor(
         per_turn=_array([line.per_turn for line in ripple]),
         torque=_array([line.torque for line in ripple]),
-        phase=_array([line.phase for line in ripple]),
+        phase=_array([own for own, _ in phases]),
         holding=_array(0.1 * cluster.gimbal_bandwidth if holding is None else holding),
         step_per_turn=_array(harmonic * steps),
         step_turn=_array(2.0 / (harmonic * steps)),
+        step_phase=_array([harmonic * own for _, own in phases]),
         step_frequency=_array(2.0 * np.pi * stepping.frequency if stepping else 1.0),
         step_damping=_array(stepping.damping if stepping else 1.0),
     )

@@ -8,18 +8,30 @@ import numpy as np
 import pytest
 
 from oracles.satellites import awkward_satellite, paper_satellite
+from quietbus.build import build_satellite
 from quietbus.dynamics.closed_loop import evaluate, initial_state
 from quietbus.model.cmg import ControlMomentGyro
 from quietbus.model.gimbal_motor import GimbalMotor, gimbal_inertia
 from quietbus.model.load import Constant, Load
+from quietbus.scenario import load_scenario, per_cmg_scenarios
 
 
-def motor(per_turn=(), torque=(), phase=(), holding=5.0, steps=1, harmonics=0, frequency=1e6):
+def motor(
+    per_turn=(),
+    torque=(),
+    phase=(),
+    holding=5.0,
+    steps=1,
+    harmonics=0,
+    frequency=1e6,
+    step_phase=0.0,
+):
     harmonic = 1 + np.arange(harmonics)
     return GimbalMotor(
         *(jnp.array(values, float) for values in (per_turn, torque, phase, holding)),
         jnp.array(harmonic * steps, float),
         jnp.array(2.0 / (harmonic * steps)),
+        jnp.array(harmonic * step_phase),
         jnp.array(float(frequency)),
         jnp.array(0.5),
     )
@@ -97,3 +109,35 @@ def test_steps_near_the_oscillation_are_amplified_like_an_oscillator():
     cluster = paper_satellite().cluster
     found = abs(np.asarray(slow.amplitudes(cluster, jnp.full(4, 0.8)))[0, 0])  # at 40 rad/s
     assert found == pytest.approx(2 / 50 * 40.0**2 / (2 * 0.5))
+
+
+def test_steps_with_a_phase_are_the_same_staircase_elsewhere():
+    """A phase b of the steps is a turn of b / N of the gimbal, for every harmonic."""
+    cluster, rates = paper_satellite().cluster, jnp.array([0.8, -0.3, 0.1, 1.2])
+    steps, shift = 50, 0.7
+    plain, shifted = (
+        motor(steps=steps, harmonics=6, frequency=60.0, step_phase=b) for b in (0.0, shift)
+    )
+    gamma = jnp.array([0.1, 2.3, -0.7, 0.01])
+    found = shifted.acceleration(cluster, gamma, rates)
+    expected = plain.acceleration(cluster, gamma + shift / steps, rates)
+    assert np.asarray(found) == pytest.approx(np.asarray(expected), rel=1e-9)
+
+
+def test_phases_left_out_are_each_units_own_and_go_with_it_to_its_own_platform():
+    lines = [{"per_turn": 300, "torque": 1e-4}, {"per_turn": 30, "torque": 1e-4, "phase": 0.2}]
+    rough = {
+        "ripple": lines,
+        "stepping": {"steps_per_turn": 200, "frequency": 20.0, "damping": 0.1},
+    }
+    scenario = load_scenario("zhang2012").with_overrides({"cluster.gimbal_motor": rough})
+    whole = build_satellite(scenario).motor
+    assert len(np.unique(np.round(whole.phase[:, 0], 9))) == 4
+    assert np.asarray(whole.phase[:, 1]) == pytest.approx([0.2] * 4)
+    first = np.asarray(whole.step_phase[:, 0])
+    assert len(np.unique(np.round(first, 9))) == 4
+    assert np.asarray(whole.step_phase) == pytest.approx(np.outer(first, np.arange(1, 6)))
+    for j, part in enumerate(per_cmg_scenarios(scenario)):
+        own = build_satellite(part).motor
+        assert np.asarray(own.phase[0]) == pytest.approx(np.asarray(whole.phase[j]))
+        assert np.asarray(own.step_phase[0]) == pytest.approx(np.asarray(whole.step_phase[j]))

@@ -14,14 +14,15 @@ from quietbus.model.cmg import ControlMomentGyro
 
 
 class GimbalMotor(eqx.Module):
-    """Ripple torque and stepping, alike for all units."""
+    """Ripple torque and stepping, alike for all units but for their phases."""
 
     per_turn: Float[Array, " ripple"]  # [-] periods of the ripple in a turn of the gimbal
     torque: Float[Array, " ripple"]  # [N m]
-    phase: Float[Array, " ripple"]  # [rad] against per_turn times gimbal angle
+    phase: Float[Array, "cmg ripple"]  # [rad] against per_turn times gimbal angle
     holding: Float[Array, ""]  # [rad/s] ripple slower than this is held
     step_per_turn: Float[Array, " harmonic"]  # [-] multiples of the number of steps in a turn
     step_turn: Float[Array, " harmonic"]  # [rad] amplitude of a step's harmonic
+    step_phase: Float[Array, "cmg harmonic"]  # [rad] of each harmonic against its gimbal angle
     step_frequency: Float[Array, ""]  # [rad/s] undamped, of the gimbal about a step
     step_damping: Float[Array, ""]  # [-] over critical damping
 
@@ -47,7 +48,8 @@ class GimbalMotor(eqx.Module):
         s = 1j * self.step_per_turn * rate
         oscillator = self.step_frequency**2 + 2.0 * self.step_damping * self.step_frequency * s
         follows = self.step_frequency**2 / (oscillator + s**2)
-        return jnp.concatenate([ripple, -1j * self.step_turn * s**2 * follows], axis=1)
+        field = -1j * self.step_turn * jnp.exp(1j * self.step_phase)
+        return jnp.concatenate([ripple, field * s**2 * follows], axis=1)
 
     def modulation(
         self,

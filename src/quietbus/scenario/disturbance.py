@@ -9,7 +9,6 @@ import numpy as np
 from pydantic import BeforeValidator, Discriminator, Tag, ValidationInfo, model_validator
 
 from quietbus.scenario.base import (
-    Angle,
     Count,
     Frequency,
     Part,
@@ -290,12 +289,15 @@ class Disturbance(Part):
         return self
 
 
+MOTOR_PHASES = 3  # of the streams of random numbers of a unit
+
+
 class Ripple(Part):
     """Torque of a gimbal motor that repeats over a turn of the gimbal."""
 
     per_turn: Annotated[int, Count(MOST_LINES_A_TURN)]
     torque: RippleTorque  # amplitude
-    phase: Angle = 0.0  # against per_turn times gimbal angle
+    phase: Phase = "random"  # against per_turn times gimbal angle
 
 
 class Stepping(Part):
@@ -305,6 +307,7 @@ class Stepping(Part):
     frequency: Frequency  # of the oscillation about a step
     damping: PositiveNumber  # over critical damping
     harmonics: Annotated[int, Count(MOST_HARMONICS)] = 5  # of the stepping frequency, taken along
+    phase: Phase = "random"  # of the steps against steps_per_turn times gimbal angle
 
 
 class GimbalMotor(Part):
@@ -314,6 +317,19 @@ class GimbalMotor(Part):
     stepping: Stepping | None = None
     # [rad/s] ripple slower than this is held by the motor; None: a tenth of the servo's bandwidth
     holding_bandwidth: PositiveAngularVelocity | None = None
+
+    def phases(self, seed: int, unit: int) -> tuple[tuple[float, ...], float]:
+        """Phases of ripple and of steps [rad] of one unit's motor, drawn where they are random.
+
+        Args:
+            seed, unit: of the rotor on this gimbal, and its number in the satellite.
+        """
+        given: list[float | Literal["random"]] = [line.phase for line in self.ripple or ()]
+        given.append(self.stepping.phase if self.stepping else 0.0)
+        generator = np.random.default_rng([seed, unit, MOTOR_PHASES])
+        drawn = zip(given, generator.uniform(-np.pi, np.pi, len(given)).tolist(), strict=True)
+        *ripple, steps = (own if said == "random" else said for said, own in drawn)
+        return tuple(ripple), steps
 
     @property
     def lines(self) -> tuple[int, ...]:

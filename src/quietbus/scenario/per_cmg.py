@@ -71,6 +71,9 @@ def per_cmg_scenarios(scenario: Scenario, scale: float | None = None) -> list[Sc
             "rotor_phases": [phases[j]],
             "gimbal_angles": [angles[j]],
         }
+        if scenario.cluster.gimbal_motor is not None:
+            motor, seed = scenario.cluster.gimbal_motor, scenario.cluster.seeds[j]
+            cluster["gimbal_motor"] = _drawn_motor(cluster["gimbal_motor"], *motor.phases(seed, j))
         if "run_up" in cluster:
             each = {k: v[j] for k, v in cluster["run_up"].items() if isinstance(v, list)}
             cluster["run_up"] = cluster["run_up"] | each
@@ -96,6 +99,15 @@ def _drawn(disturbance: Disturbance, unit: int) -> dict[str, Any]:
         for line, phase in zip(disturbance.orders, disturbance.phases(unit), strict=True)
     ]
     return {"seed": int(seed), "orders": orders}
+
+
+def _drawn_motor(data: dict[str, Any], ripple: tuple[float, ...], steps: float) -> dict[str, Any]:
+    """A gimbal motor with its phases as numbers."""
+    lines = zip(data.get("ripple", []), ripple, strict=True)
+    drawn: dict[str, Any] = {"ripple": [line | {"phase": phase} for line, phase in lines]}
+    if "stepping" in data:
+        drawn["stepping"] = data["stepping"] | {"phase": steps}
+    return data | {key: value for key, value in drawn.items() if value}
 
 
 _BY_PLATE = {"mass": (1, 0), "inertia": (1, 2), "center_of_mass": (0, 1)}
