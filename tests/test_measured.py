@@ -8,9 +8,11 @@ import pytest
 import xarray as xr
 
 import quietbus as qb
+from oracles.spectra import map_of
 from oracles.wheels import measured as spectra
 from quietbus import cli
-from quietbus.measured import MapError, WaterfallFit, noise_bandwidth
+from quietbus.analysis.waterfall import FitError, LineShape
+from quietbus.measured import MapError, WaterfallFit
 from quietbus.scenario.text import read_yaml
 
 RPM = 2 * np.pi / 60
@@ -24,7 +26,7 @@ speed \\ frequency, 10, 20, 30, 40
 1200, 5, 6, 7, 8
 1800, 9, 10, 11, 12
 """
-LONG = """# unit: N*m
+LONG = """# unit: N*m_peak
 # speed_unit: rev/s
 component,speed,frequency,value
 """ + "\n".join(f"radial_torque,{s},{f},{0.1 * s + f}" for f in (5, 10, 15) for s in (3, 1, 2))
@@ -42,12 +44,12 @@ def put(tmp_path):
     return write
 
 
-def netcdf(path, psd, frequency, name="radial_force", speed_unit="rpm", **attributes):
+def netcdf(path, psd, frequency, name="radial_force", turns=TURNS, **attributes):
     about = {"units": "N^2/Hz", "window": "hann"} | attributes
     xr.Dataset(
         {name: (("speed", "frequency"), psd, about)},
         {
-            "speed": ("speed", 60 * TURNS[: len(psd)], {"units": speed_unit}),
+            "speed": ("speed", 60 * turns[: len(psd)], {"units": "rpm"}),
             "frequency": ("frequency", frequency, {"units": "Hz"}),
         },
     ).to_netcdf(path, engine="h5netcdf")
@@ -70,8 +72,54 @@ def test_long_rows_of_amplitudes_become_power_spectral_densities(put):
     amplitude = 0.1 * s[:, None] + f
     assert found["speed"].to_numpy() == pytest.approx(2 * np.pi * s)
     assert found.to_numpy() == pytest.approx(0.5 * amplitude**2 / (1.5 * 5.0))
-    assert noise_bandwidth("hann") == pytest.approx(1.5)
-    assert noise_bandwidth("flattop") == pytest.approx(3.77, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("unit", "psd"),
+    [
+        ("N^2/Hz", 3.0),
+        ("N_rms^2/Hz", 3.0),
+        ("mN/Hz^0.5", 9e-6),
+        ("N_rms/sqrt(Hz)", 9.0),
+        ("N/√Hz", 9.0),
+        ("N^2", 3.0 / 15.0),  # over the noise bandwidth of Hann's window, 1.5 bins of 10 Hz
+        ("mN_rms", 9e-6 / 15.0),
+        ("N_peak", 9.0 / 2 / 15.0),
+        ("N pk", 9.0 / 2 / 15.0),
+        ("N_pp", 9.0 / 8 / 15.0),
+    ],
+)
+def test_a_value_is_what_its_unit_says(put, unit, psd):
+    text = MATRIX.replace("mN^2/Hz", unit).replace("600, 1", "600, 3")
+    found = qb.read_waterfall(put(text))["radial_force"]
+    assert found.to_numpy()[0, 0] == pytest.approx(psd)
+
+
+def test_an_amplitude_is_asked_about_as_hertz_squared_is(put):
+    for unit, text in (("N", MATRIX.replace("mN^2/Hz", "N")), ("N*m", LONG.replace("_peak", ""))):
+        with pytest.raises(MapError) as told:
+            qb.read_waterfall(put(text))
+        assert f"write {unit}_peak or {unit}_rms; got '{unit}'" in str(told.value)
+
+
+def test_amplitudes_without_a_window_are_read_by_the_one_that_is_found(put):
+    """Tukey's window has a noise bandwidth of 1.10 bins, Hann's, which stands in, of 1.5."""
+    rpm = np.arange(600, 3001, 200)
+    frequency, psd = map_of(((1.0, 1e-6),), ("tukey", 0.25), 1e-4, rpm)
+    width = LineShape("tukey 0.25", 1024).noise_bandwidth
+    rows = [
+        ",".join(f"{v:.6e}" for v in (speed, *np.sqrt(row * width)))
+        for speed, row in zip(rpm, psd, strict=True)
+    ]
+    head = "# component: radial_force\n# unit: N_rms\n# speed_unit: rpm\n"
+    text = head + ",".join(map(str, ["speed", *frequency])) + "\n" + "\n".join(rows)
+    fitted = qb.fit_waterfall(put(text))
+    found = fitted.components["radial_force"]
+    assert found.window.name == "tukey 0.25"
+    assert found.orders[0].coefficient.value == pytest.approx(1e-6, rel=1e-3)
+    assert "radial_force: window: none is declared; lines have the shape" in fitted.notes[0]
+    with pytest.raises(FitError, match="radial_force: window: 'hann' is declared"):
+        qb.fit_waterfall(put(text.replace("# speed_unit", "# window: hann\n# speed_unit")))
 
 
 def test_netcdf_is_read_with_its_units(tmp_path):
@@ -86,11 +134,13 @@ def test_netcdf_is_read_with_its_units(tmp_path):
     ("old", "new", "message"),
     [
         ("# component: radial_force", "", "component: expected one of radial_force"),
-        ("mN^2/Hz", "kg", r"unit: .*in N\^2/Hz or an amplitude in N, got 'kg'"),
+        ("mN^2/Hz", "kg", r"unit: .*in N\^2/Hz .* amplitude in N_rms or N_peak, got 'kg'"),
+        ("mN^2/Hz", "mN", "unit: .* peak or its root mean square. write mN_peak or mN_rms; got"),
         ("mN^2/Hz", "N^2*s/rad", "unit: expected a power spectral density"),
         ("# speed_unit: rpm", "", "speed_unit: expected a unit, such as rad/s, got none"),
         ("speed_unit: rpm", "speed_unit: Hz", "turns or radians"),
-        ("window: hann", "window: boxcar", "window: expected one of none, hann"),
+        ("window: hann", "window: hen", "window: expected 'none' or a window .*, got 'hen'"),
+        ("window: hann", "window: tukey x", r"window: expected .* tukey 0.25, got 'tukey x'"),
         ("sample_rate: 200", "sample_rate: 60", "at most 30 Hz, the Nyquist .*, got 40"),
         ("1200, 5", "400, 5", "speed: expected ascending values, got 400 after 600"),
         ("600, 1", "0, 1", "speed: expected numbers above 0, got 0"),
@@ -130,7 +180,7 @@ def test_other_wrong_files_are_told(put, tmp_path):
     with pytest.raises(MapError, match=r"expected variables among radial_force.*got thrust"):
         qb.read_waterfall(wrong)
     wrong = netcdf(tmp_path / "b.nc", np.ones((3, 4)), np.arange(4.0), units="N*m")
-    with pytest.raises(MapError, match="or an amplitude in N, got"):
+    with pytest.raises(MapError, match="or an amplitude in N_rms or N_peak, got"):
         qb.read_waterfall(wrong)
 
 
@@ -171,7 +221,7 @@ def test_a_floor_that_the_mode_does_not_shape_comes_back_at_the_mount(fitted):
     f = each.floor_frequency
     d = 2j * 0.02 * f / 230.0
     passed = np.abs((1 + d) / (1 + d - (f / 230.0) ** 2)) ** 2
-    assert each.rotor_floor * passed == pytest.approx(each.floor, rel=0.05)
+    assert each.rotor_floor(each.modes) * passed == pytest.approx(each.floor, rel=0.05)
 
 
 def test_orders_of_components_are_one_where_they_agree(fitted):
@@ -248,3 +298,21 @@ def test_a_map_without_lines_is_bad_input(tmp_path, capsys):
     code, _, err = run("fit", file, "-o", tmp_path / "out", capsys=capsys)
     assert code == 2
     assert "radial_force: no order stands out" in err
+    assert not (tmp_path / "out").exists()  # not even an empty folder
+
+
+def test_a_second_mode_is_told_and_left_out_of_the_block(tmp_path, capsys):
+    rpm = np.linspace(600, 6000, 40)
+    lines, modes = ((1.0, 1e-6), (2.0, 3e-7), (4.42, 1.5e-7)), ((110.0, 0.02), (190.0, 0.03))
+    frequency, psd = map_of(lines, "hann", 1e-3, rpm, modes, seconds=8)
+    map_ = netcdf(tmp_path / "two.nc", psd, frequency, turns=rpm / 60)
+    code, out, err = run("fit", map_, "--json", capsys=capsys)
+    found = json.loads(out)
+    assert code == 0
+    both = found["components"]["radial_force"]["modes"]
+    assert [mode["frequency_hz"]["value"] for mode in both] == pytest.approx([110, 190], rel=1e-3)
+    kept = found["disturbance"]["resonances"]["radial"]
+    assert kept["frequency"] == pytest.approx(110, rel=1e-3)
+    # at its peak the other passes on 1 / (2 damping), and a little
+    assert "the mode at 190 Hz is left out, which changes lines by up to a factor of 1" in err
+    assert found["notes"][0] in err

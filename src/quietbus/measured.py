@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 import os
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,18 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from pydantic_core import PydanticCustomError
-from scipy.signal import get_window
 
-from quietbus.analysis.waterfall import WINDOWS, ComponentFit, FitError, Waterfall, fit
+from quietbus.analysis.waterfall import (
+    ComponentFit,
+    FitError,
+    FittedMode,
+    LineShape,
+    Waterfall,
+    fit,
+    segment_size,
+    transmission,
+    window_name,
+)
 from quietbus.scenario import Problem, ScenarioError
 from quietbus.scenario.text import write_yaml
 from quietbus.scenario.units import Quantity, shown
@@ -28,9 +38,22 @@ _PSD = {
     "force": Quantity("a power spectral density", "N^2/Hz", exact=True),
     "torque": Quantity("a power spectral density", "N^2*m^2/Hz", exact=True),
 }
+_ROOT = {
+    "force": Quantity("the root of a power spectral density", "N/Hz^0.5", exact=True),
+    "torque": Quantity("the root of a power spectral density", "N*m/Hz^0.5", exact=True),
+}
+_SQUARE = {
+    "force": Quantity("a power spectrum", "N^2", exact=True),
+    "torque": Quantity("a power spectrum", "N^2*m^2", exact=True),
+}
 _AMPLITUDE = {"force": Quantity("an amplitude", "N"), "torque": Quantity("an amplitude", "N*m")}
+# an amplitude's reading of a sinusoid, of its root mean square
+_READINGS = {"rms": 1.0, "peak": 0.5**0.5, "pk": 0.5**0.5, "pp": 0.125**0.5}
+_READING = re.compile(r"[_ ]?(rms|peak|pk|pp)\b", re.IGNORECASE)
+_LEAST_WINDOW = "hann"  # by which amplitudes are read until the window is known
 _EVEN = 1e-3  # relative difference of steps of frequency
 _TOLD = 5  # problems of a file
+_RESONANCES = {"radial_force": "radial", "axial_force": "axial", "radial_torque": "rocking"}
 _SNAP = 2e-3  # orders as near to a whole number are taken as that
 
 
@@ -101,13 +124,11 @@ class _Check:
             got = shown(name or None)
             self.wrong(f"expected one of {', '.join(KINDS)}, got {got}", "component")
             return None
-        window = about.get("window", "hann")
-        if window not in WINDOWS:
-            self.wrong(f"expected one of {', '.join(WINDOWS)}, got {shown(window)}", "window")
+        window = self._window(about)
         per_speed = self._unit(_SPEED, about, "speed_unit")
         per_frequency = self._unit(_FREQUENCY, about, "frequency_unit", "Hz")
         kind, unit = name.rpartition("_")[2], about.get("unit", "")
-        power, factor = self._value_unit(kind, unit)
+        scale = self._scale(kind, unit)
         self.axis("speed", speed, "above 0", speed > 0.0)
         self.axis("frequency", frequency, "at least 0", frequency >= 0.0)
         if values.shape != (len(speed), len(frequency)):
@@ -131,21 +152,28 @@ class _Check:
         steps = np.diff(hertz)
         if np.ptp(steps) > _EVEN * np.mean(steps):
             self.wrong("expected evenly spaced frequencies, as of a spectrum", "frequency")
-        self._nyquist(about, hertz)
+        rate = self._nyquist(about, hertz)
         if len(self.problems) > before:
             return None
-        values = values * factor
-        if not power:
-            values = 0.5 * values**2 / (noise_bandwidth(window) * np.mean(steps))
+        assert scale is not None
+        values = (scale.factor * values) ** scale.power
+        shape = LineShape(window or _LEAST_WINDOW, segment_size(hertz, rate))
+        if not scale.density:
+            values = values / (shape.noise_bandwidth * float(np.mean(steps)))
         coordinates = {
             "speed": ("speed", speed * per_speed, {"units": "rad/s"}),
             "frequency": ("frequency", hertz, {"units": "Hz"}),
         }
-        attributes = {
+        attributes: dict[str, Any] = {
             "units": _PSD[kind].unit,
             "long_name": f"one-sided power spectral density of the {name.replace('_', ' ')}",
-            "window": window,
         }
+        if window is not None:
+            attributes["window"] = window
+        elif not scale.density:
+            attributes["noise_bandwidth"] = shape.noise_bandwidth
+        if rate is not None:
+            attributes["sample_rate"] = f"{rate:.15g} Hz"
         return xr.DataArray(values, coordinates, ("speed", "frequency"), name, attributes)
 
     def _unit(
@@ -157,19 +185,54 @@ class _Check:
             return None
         return self.factor(quantity, unit, key)
 
-    def _value_unit(self, kind: str, unit: str) -> tuple[bool, float]:
-        """Whether values are powers, and SI per unit."""
-        for power, quantity in ((True, _PSD[kind]), (False, _AMPLITUDE[kind])):
-            try:
-                return power, quantity.read(f"1 {unit}") if unit else math.nan
-            except PydanticCustomError:
-                continue
+    def _window(self, about: dict[str, str]) -> str | None:
+        if not about.get("window"):
+            return None
+        try:
+            return window_name(about["window"])
+        except ValueError as error:
+            self.wrong(str(error), "window")
+            return None
+
+    def _scale(self, kind: str, unit: str) -> "_Scale | None":
+        """What a value of a map is."""
+        reading = _READING.search(unit)
+        plain = _READING.sub("", unit)
+        for text in ("sqrt(Hz)", "√(Hz)", "√Hz", "rtHz"):
+            plain = plain.replace(text, "Hz^0.5")
+        rms = reading is None or reading[1].lower() == "rms"
+        for quantity, power, density in (
+            (_PSD[kind], 1, True),
+            (_ROOT[kind], 2, True),
+            (_SQUARE[kind], 1, False),
+        ):
+            factor = self._factor(quantity, plain)
+            if factor is not None and rms:
+                return _Scale(factor, power, density)
+        factor, si = self._factor(_AMPLITUDE[kind], plain), _AMPLITUDE[kind].unit
+        if factor is not None and reading is not None:
+            return _Scale(factor * _READINGS[reading[1].lower()], 2, False)
+        if factor is not None:
+            self.wrong(
+                f"an amplitude: does a sinusoid read its peak or its root mean square? write "
+                f"{unit}_peak or {unit}_rms; got {shown(unit)}",
+                "unit",
+            )
+            return None
         self.wrong(
-            f"expected a power spectral density in {_PSD[kind].unit} or an amplitude in "
-            f"{_AMPLITUDE[kind].unit}, got {shown(unit)}",
+            f"expected a power spectral density in {_PSD[kind].unit} or its root in "
+            f"{_ROOT[kind].unit}, a power spectrum in {_SQUARE[kind].unit}, or an amplitude in "
+            f"{si}_rms or {si}_peak, got {shown(unit or None)}",
             "unit",
         )
-        return True, math.nan
+        return None
+
+    @staticmethod
+    def _factor(quantity: Quantity, unit: str) -> float | None:
+        try:
+            return quantity.read(f"1 {unit}") if unit else None
+        except PydanticCustomError:
+            return None
 
     def axis(self, name: str, values: np.ndarray, what: str, fine: np.ndarray) -> None:
         """An axis of a map is long enough, in order and of the right sign."""
@@ -182,28 +245,31 @@ class _Check:
                 f"expected ascending values, got {values[i + 1]:g} after {values[i]:g}", name
             )
 
-    def _nyquist(self, about: dict[str, str], hertz: np.ndarray) -> None:
+    def _nyquist(self, about: dict[str, str], hertz: np.ndarray) -> float | None:
+        """The sample rate [Hz], where one is given."""
         if not about.get("sample_rate"):
-            return
+            return None
         try:
             rate = Quantity("a frequency", "Hz", above=0.0).read(about["sample_rate"])
         except PydanticCustomError as error:
             self.wrong(str(error), "sample_rate")
-            return
+            return None
         if hertz[-1] > 0.5 * rate * (1.0 + 1e-9):
             self.wrong(
                 f"expected at most {0.5 * rate:g} Hz, the Nyquist frequency of the sample_rate, "
                 f"got {hertz[-1]:g}",
                 "frequency",
             )
+        return rate
 
 
-def noise_bandwidth(window: str) -> float:
-    """Equivalent noise bandwidth of a spectrum's window [bins]."""
-    if window == "none":
-        return 1.0
-    values = get_window(window, 4096)
-    return float(len(values) * np.sum(values**2) / np.sum(values) ** 2)
+@dataclass(frozen=True)
+class _Scale:
+    """How a value becomes a power: (factor * value) ** power, in SI."""
+
+    factor: float
+    power: int
+    density: bool  # per Hz; else what a sinusoid reads, by the window's noise bandwidth
 
 
 def _read_netcdf(file: Path) -> xr.Dataset:
@@ -384,24 +450,62 @@ class WaterfallFit:
 
     components: dict[str, ComponentFit]
 
+    @property
+    def notes(self) -> list[str]:
+        """What is not to be relied on, and what the block ``disturbance`` leaves out."""
+        notes = []
+        for name, each in self.components.items():
+            notes += [f"{name}: {note}" for note in each.notes]
+            kept = _kept(name, each)
+            for mode in each.modes:
+                if mode is not kept:
+                    notes.append(f"{name}: {_left_out(each, mode)}")
+            if any(line.doubt for line in each.orders):
+                notes.append(f"{name}: orders in doubt are left out of the block 'disturbance'")
+        return notes
+
     def to_dict(self) -> dict[str, Any]:
         """All fitted numbers with their standard deviations, for JSON."""
         return {
             "components": {name: each.to_dict() for name, each in self.components.items()},
             "disturbance": self.disturbance(),
+            "notes": self.notes,
         }
 
     def disturbance(self) -> dict[str, Any]:
         """The scenario's ``rotor.disturbance``.
 
         Orders of several components that agree within three standard deviations or 0.2 % are one;
-        those as near to a whole number are that number. Phases are random: a map has none.
+        those as near to a whole number are that number. Phases are random: a map has none. Orders
+        in doubt are left out. A scenario has one resonance of a component: the one that shapes
+        the lines most, with the floor before it.
         """
+        resonances, broadband = {}, {}
+        for name, each in self.components.items():
+            kept = _kept(name, each)
+            if kept is not None:
+                resonances[_RESONANCES[name]] = {
+                    "frequency": kept.frequency.value,
+                    "damping": kept.damping.value,
+                }
+            floor = each.rotor_floor([kept] if kept else [])
+            broadband[name] = {"frequency": each.floor_frequency.tolist(), "psd": floor.tolist()}
+        block: dict[str, Any] = {"orders": self._orders()}
+        if resonances:
+            block["resonances"] = resonances
+        return _rounded(block | {"broadband": broadband})
+
+    def _orders(self) -> list[dict[str, Any]]:
         orders: list[dict[str, Any]] = []
-        found = [(line, name) for name, each in self.components.items() for line in each.orders]
+        found = [
+            (line, name)
+            for name, each in self.components.items()
+            for line in each.orders
+            if line.doubt is None
+        ]
         for line, name in sorted(found, key=lambda pair: pair[0].order.value):
-            value = line.order.value
-            near = max(3.0 * line.order.deviation, _SNAP * min(value, 1.0))
+            value, whirl = line.order.value, line.whirl
+            near = max(3.0 * (line.order.deviation or 0.0), _SNAP * min(value, 1.0))
             if round(value) >= 1 and abs(value - round(value)) < near:
                 value = float(round(value))
             same = next(
@@ -409,39 +513,19 @@ class WaterfallFit:
                     o
                     for o in orders
                     if abs(o["order"] - value) < near
-                    and o.get("whirl", "forward") == line.whirl
+                    and o.get("whirl", "forward") == whirl
                     and name not in o
                 ),
                 None,
             )
             if same is None:
                 same = {"order": value}
-                if line.whirl == "backward":
+                if whirl == "backward":
                     same["whirl"] = "backward"
                 orders.append(same)
             same[name] = line.coefficient.value
         orders = [order | {"phase": "random"} for order in orders]
-        orders.sort(key=lambda order: (order["order"], order.get("whirl") == "backward"))
-        resonances = {}
-        for name, key in (
-            ("radial_force", "radial"),
-            ("axial_force", "axial"),
-            ("radial_torque", "rocking"),
-        ):
-            mode = self.components[name].mode if name in self.components else None
-            if mode is not None:
-                resonances[key] = {
-                    "frequency": mode.frequency.value,
-                    "damping": mode.damping.value,
-                }
-        broadband = {
-            name: {"frequency": each.floor_frequency.tolist(), "psd": each.rotor_floor.tolist()}
-            for name, each in self.components.items()
-        }
-        block: dict[str, Any] = {"orders": orders}
-        if resonances:
-            block["resonances"] = resonances
-        return _rounded(block | {"broadband": broadband})
+        return sorted(orders, key=lambda o: (o["order"], o.get("whirl") == "backward"))
 
     def to_yaml(self) -> str:
         """YAML text of the block ``disturbance``, in SI units."""
@@ -466,6 +550,36 @@ class WaterfallFit:
         return xr.Dataset(data, coordinates)
 
 
+def _kept(name: str, fitted: ComponentFit) -> FittedMode | None:
+    """The mode of a component that a scenario can have: the one that shapes the lines most."""
+    # a mode in a torque that does not split is a structure's, not the rotor's rocking
+    able = [mode for mode in fitted.modes if mode.split or name != "radial_torque"]
+    if name not in _RESONANCES or not able:
+        return None
+    return max(able, key=lambda mode: float(np.ptp(np.log(_amplified(fitted, mode)))))
+
+
+def _left_out(fitted: ComponentFit, mode: FittedMode) -> str:
+    largest = float(np.max(np.abs(np.log(_amplified(fitted, mode)))))
+    return (
+        f"the block 'disturbance' holds one resonance of the rotor on its bearings; the mode at "
+        f"{mode.frequency.value:.4g} Hz is left out, which changes lines by up to a factor of "
+        f"{math.exp(largest):.2g}"
+    )
+
+
+def _amplified(fitted: ComponentFit, mode: FittedMode) -> np.ndarray:
+    """What a mode lets pass of every line at every speed."""
+    own = mode.mode
+    ways = [1.0 if line.whirl == "forward" else -1.0 for line in fitted.orders]
+    return np.concatenate(
+        [
+            transmission(line.order.value, speed, own.w0, own.damping, way * own.split)
+            for line, speed, way in zip(fitted.orders, fitted.line_speed, ways, strict=True)
+        ]
+    )
+
+
 def _rounded(data: Any) -> Any:
     """Six digits, more than any fit is good for, which can be read."""
     if isinstance(data, dict):
@@ -484,7 +598,8 @@ def fit_waterfall(maps: xr.Dataset | str | os.PathLike[str], most: int = 20) -> 
 
     Raises:
         MapError: the file is wrong.
-        FitError: too few speeds, or no order stands out; it names the component.
+        FitError: too few speeds, no order stands out, lines do not have the declared window's
+            shape, or what was found does not explain the map; it names the component.
     """
     data = maps if isinstance(maps, xr.Dataset) else read_waterfall(maps)
     fits = {}
@@ -495,7 +610,9 @@ def fit_waterfall(maps: xr.Dataset | str | os.PathLike[str], most: int = 20) -> 
             array["speed"].to_numpy(),
             array["frequency"].to_numpy(),
             array.to_numpy(),
-            array.attrs.get("window", "hann"),
+            array.attrs.get("window"),
+            sample_rate=_hertz(array.attrs.get("sample_rate")),
+            noise_bandwidth=array.attrs.get("noise_bandwidth"),
         )
         try:
             fits[name] = fit(measured, most)
@@ -504,3 +621,7 @@ def fit_waterfall(maps: xr.Dataset | str | os.PathLike[str], most: int = 20) -> 
     if not fits:
         raise FitError(f"expected variables among {', '.join(KINDS)}, got none")
     return WaterfallFit(fits)
+
+
+def _hertz(rate: str | None) -> float | None:
+    return None if rate is None else Quantity("a frequency", "Hz", above=0.0).read(rate)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     import numpy as np
 
+    from quietbus.analysis.waterfall import FittedMode
     from quietbus.measured import WaterfallFit
     from quietbus.results import Summary
     from quietbus.scenario import Scenario
@@ -404,34 +405,43 @@ def fit_tables(fitted: WaterfallFit) -> Iterator[Table]:
     for name, each in fitted.components.items():
         unit = "kg m" if name.endswith("force") else "kg m^2"
         table = _titled(f"Orders of the {name.replace('_', ' ')}")
-        for column in ("order", "+-", f"coefficient\n{unit}", "+- %", "whirl", "speeds"):
+        columns = ("order", "+-", f"coefficient\n{unit}", "+- %", "whirl", "speeds", "explained\n%")
+        for column in columns:
             table.add_column(column, justify="left" if column == "whirl" else "right")
-        for line, speeds in zip(each.orders, each.line_speed, strict=True):
-            percent = 100.0 * line.coefficient.deviation / line.coefficient.value
+        splits = any(mode.split for mode in each.modes)
+        for line, speeds, share in zip(
+            each.orders, each.line_speed, each.explained.by_order[:-1], strict=True
+        ):
+            relative = line.coefficient.relative
             table.add_row(
-                f"{line.order.value:.4f}",
+                f"{line.order.value:.4f}" + ("?" if line.doubt else ""),
                 f"{line.order.deviation:.1e}",
                 f"{line.coefficient.value:.3e}",
-                f"{percent:.2g}",
-                line.whirl if each.mode and each.mode.split else "",
+                "unknown" if relative is None else f"{100.0 * relative:.2g}",
+                line.whirl if splits else "",
                 str(len(speeds)),
+                f"{100.0 * share:.3g}",
             )
-        said = f"lines: measured over fitted, RMS error {100.0 * each.line_error:.2g} %"
-        if each.mode is not None:
-            mode = each.mode
-            said = (
-                f"mode: {mode.frequency.value:.5g} Hz (+- {mode.frequency.deviation:.1g}), "
-                f"damping {mode.damping.value:.4g} (+- {mode.damping.deviation:.1g})"
-                + (
-                    f", spin over transverse inertia {mode.split.value:.4g}"
-                    f" (+- {mode.split.deviation:.1g})"
-                    if mode.split
-                    else ""
-                )
-                + f"; {said}"
-            )
-        table.caption = said
+        said = [_mode_text(mode) for mode in each.modes]
+        said.append(f"lines: measured over fitted, RMS error {100.0 * each.line_error:.2g} %")
+        said.append(f"misfit {each.misfit:.2g} of the spectra's scatter")
+        said.append(f"{100.0 * each.explained.total:.3g} % of the power explained")
+        table.caption = "; ".join(said)
         yield table
+
+
+def _mode_text(mode: FittedMode) -> str:
+    def near(deviation: float | None) -> str:
+        return "+- unknown" if deviation is None else f"+- {deviation:.1g}"
+
+    said = (
+        f"mode: {mode.frequency.value:.5g} Hz ({near(mode.frequency.deviation)}), "
+        f"damping {mode.damping.value:.4g} ({near(mode.damping.deviation)})"
+    )
+    if mode.split is None:
+        return said
+    split = mode.split
+    return f"{said}, spin over transverse inertia {split.value:.4g} ({near(split.deviation)})"
 
 
 def _left(numbers: Mapping[str, Any], axis: int) -> tuple[str, str]:

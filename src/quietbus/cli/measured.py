@@ -79,15 +79,17 @@ def fit(
     from quietbus.analysis.waterfall import FitError
     from quietbus.measured import fit_waterfall
 
-    if not as_json:
-        make_folder(output, "fit.json")
-        check_file(output / "disturbance.yaml", BLOCK)
     try:
         with status() as tell:
             tell("fitting")
             fitted = fit_waterfall(file, most)
     except FitError as error:
         raise BadInput(f"{file}: {error}") from None
+    if not as_json:
+        make_folder(output, "fit.json")  # not before: a wrong map leaves no folder
+        check_file(output / "disturbance.yaml", BLOCK)
+    for note in fitted.notes:
+        print(f"note: {visible_lines(note)}", file=sys.stderr)
     if as_json:
         print(json.dumps(fitted.to_dict(), indent=2, allow_nan=False))
         return

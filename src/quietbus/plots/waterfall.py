@@ -13,13 +13,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from quietbus.analysis.waterfall import ComponentFit
+    from quietbus.analysis.waterfall import ComponentFit, Waterfall
     from quietbus.measured import WaterfallFit
 
 RPM = 30.0 / np.pi
 RESIDUAL = 10.0  # [dB] at the ends of the residual's colours
 DECADES = 7.0  # of power that colours tell apart
 COLUMNS = 256  # of a map
+NAME = (0.14, 0.05)  # width and height of an order's name over those of a map
 NAMED = 8  # orders named on their rays; more would cover the map
 
 
@@ -42,8 +43,8 @@ def maps(fitted: ComponentFit) -> Figure:
     highest = float(measured.psd.max())
     least = max(float(fitted.fitted.min()), highest * 10.0**-DECADES)
     powers = LogNorm(0.5 * least, highest)
-    sums = (_pooled(psd, np.add) for psd in (measured.psd, fitted.fitted))
-    residual = 10.0 * np.log10(np.maximum(next(sums), 0.1 * least) / next(sums))
+    ratio = _pooled(measured.psd, np.add) / _pooled(fitted.fitted, np.add)
+    residual = 10.0 * np.log10(np.maximum(ratio, 10.0 ** (-0.2 * RESIDUAL)))
     decibels = Normalize(-RESIDUAL, RESIDUAL)
     unit = "N²/Hz" if measured.component.endswith("force") else "N²m²/Hz"
     for axes, title, values, norm, colours in (
@@ -75,7 +76,7 @@ def maps(fitted: ComponentFit) -> Figure:
         xlim=(measured.frequency[0], measured.frequency[-1]),
         ylim=(RPM * measured.speed[0], RPM * measured.speed[-1]),
     )
-    if fitted.mode is not None:
+    if fitted.modes:
         panels[1].legend(loc="lower right", fontsize=8, labelcolor="white")
     return figure
 
@@ -90,25 +91,46 @@ def _pooled(values: np.ndarray, how: np.ufunc) -> np.ndarray:
 
 
 def _overlay(axes: Axes, fitted: ComponentFit) -> None:
-    """Rays of the orders, named, and the mode's whirl."""
+    """Rays of the orders, named along the edge where they leave, and the modes' whirl."""
     measured = fitted.measured
     strongest = sorted(fitted.orders, key=lambda line: -line.coefficient.value)[:NAMED]
     for line in fitted.orders:
         h = line.order.value
         axes.plot(h * measured.turns, RPM * measured.speed, color="white", lw=0.5, ls=":")
-        if line in strongest:
-            top = min(measured.turns[-1], measured.frequency[-1] / h)
-            axes.annotate(
-                f"{h:.3g}",
-                (0.93 * h * top, 0.93 * 60.0 * top),
-                color="white",
-                fontsize=7,
-                ha="right",
-                va="center",
-            )
+    _name_rays(axes, measured, sorted(line.order.value for line in strongest))
     for k, whirl in enumerate(fitted.whirl_hz(measured.speed)):
-        label = "mode on the bearings" if k == 0 else None
+        label = "modes" if k == 0 else None
         axes.plot(whirl, RPM * measured.speed, color=COLOURS[4], lw=1.2, ls=DASHES[1], label=label)
+
+
+def _name_rays(axes: Axes, measured: Waterfall, orders: list[float]) -> None:
+    """Names to the right of rays, as high as they find room, on no other ray if that can be."""
+    width, height = measured.frequency[-1] - measured.frequency[0], np.ptp(measured.turns)
+    first, last = measured.turns[0], measured.turns[-1]
+    taken: list[tuple[float, float]] = []
+
+    def free(x: float, y: float) -> bool:
+        return all(
+            abs(x - other[0]) > NAME[0] * width or abs(y - other[1]) > NAME[1] * height
+            for other in taken
+        )
+
+    def crossed(h: float, x: float, y: float) -> bool:
+        return any(x - 0.01 * width < o * y < x + NAME[0] * width for o in orders if o != h)
+
+    for h in orders:
+        top = min(last, (1.0 - 1.2 * NAME[0]) * measured.frequency[-1] / h)
+        places = [
+            (h * turn + 0.015 * width, turn)
+            for turn in first + np.linspace(0.95, 0.25, 29) * (top - first)
+        ]
+        room = [place for place in places if free(*place)]
+        best = [place for place in room if not crossed(h, *place)] or room
+        if not best:
+            continue  # the picture of the lines names it
+        taken.append(best[0])
+        x, y = best[0]
+        axes.annotate(f"{h:.3g}", (x, 60.0 * y), color="white", fontsize=7, va="center")
 
 
 def lines(fitted: ComponentFit) -> Figure:

@@ -1,0 +1,23 @@
+"""Fit of measured speed-frequency maps (waterfalls): orders, modes, broadband floor."""
+
+from quietbus.analysis.waterfall.fit import LEAST_SPEEDS, fit
+from quietbus.analysis.waterfall.lineshape import LineShape, segment_size, window_name
+from quietbus.analysis.waterfall.measured import FitError, Waterfall
+from quietbus.analysis.waterfall.modes import noise_passed, transmission
+from quietbus.analysis.waterfall.result import ComponentFit, Estimate, FittedMode, FittedOrder
+
+__all__ = [
+    "LEAST_SPEEDS",
+    "ComponentFit",
+    "Estimate",
+    "FitError",
+    "FittedMode",
+    "FittedOrder",
+    "LineShape",
+    "Waterfall",
+    "fit",
+    "noise_passed",
+    "segment_size",
+    "transmission",
+    "window_name",
+]
