@@ -1,9 +1,11 @@
 """Making, keeping, failing and going on, with a small paper of its own."""
 
+import inspect
 import json
 import math
 import subprocess
 import sys
+from dataclasses import replace
 from importlib.resources import files
 
 import jsonschema
@@ -11,9 +13,11 @@ import pytest
 from matplotlib.figure import Figure
 
 from quietbus import cli
-from quietbus.reproduce import paper as machinery
+from quietbus.reproduce import load_paper, sources
 from quietbus.reproduce.claims import Claim
-from quietbus.reproduce.paper import Findings, Paper, Part, reproduce
+from quietbus.reproduce.paper import MissingExtra, reproduce
+from quietbus.reproduce.parts import Findings, Paper, Part
+from quietbus.reproduce.sources import ROOT, sources_of
 
 SCHEMA = json.loads(files("quietbus.reproduce").joinpath("table.schema.json").read_text())
 
@@ -29,7 +33,7 @@ class Small:
             "small",
             "Nobody, nowhere",
             [
-                Claim(name, "eq. 1", "a number", "1.0", "m", "because")
+                Claim(name, "eq. 1", "a number", "1.0", "m", "because", "simulated")
                 for name in ("one", "two", "three")
             ],
             {
@@ -70,7 +74,10 @@ def test_report_and_table_hold_every_figure_caption_and_number(small, tmp_path):
         assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
         for text in (f"caption of {name}", f"text of {name}", f"({name}.png)"):
             assert text in report
-    assert "| eq. 1 | a number | 1.0 m | 1 m | +0 % | within rounding | because |" in report
+    assert (
+        "| eq. 1 | a number | 1.0 m | 1 m | +0 % | simulated | within rounding | because |"
+        in report
+    )
 
 
 def test_what_is_made_is_not_made_again_unless_asked(small, tmp_path):
@@ -98,11 +105,91 @@ def test_what_is_not_whole_or_of_other_sources_is_made_again(small, tmp_path, ha
     assert not list(tmp_path.rglob("*.part"))
 
 
-def test_the_key_changes_with_sources_and_versions(monkeypatch):
-    before = machinery.fingerprint()
-    assert machinery.fingerprint() == before
-    monkeypatch.setattr(machinery.quietbus, "__version__", "0.0.0")
-    assert machinery.fingerprint() != before
+def package(tmp_path, monkeypatch):
+    """A package of its own in which two figures share one module."""
+    text = {
+        "__init__.py": "",
+        "shared.py": "import numpy\nfrom quietbus.deep import depth\n",
+        "deep.py": "def depth():\n    import scipy.linalg\n",
+        "one.py": "from quietbus import shared\n",
+        "two.py": "from quietbus.shared import x\nimport mujoco\nimport json\n"
+        "if TYPE_CHECKING:\n    from quietbus.other import T\n",
+        "other.py": "import matplotlib\n",
+        "data.yaml": "a: 1\n",
+    }
+    for name, content in text.items():
+        (tmp_path / name).write_text(content)
+    monkeypatch.setattr(sources, "ROOT", tmp_path)
+    sources._imports.cache_clear()
+
+
+def test_a_figure_depends_on_what_its_module_imports_and_on_nothing_else(tmp_path, monkeypatch):
+    package(tmp_path, monkeypatch)
+    one, two = (sources_of(tmp_path / f"{name}.py") for name in ("one", "two"))
+    assert set(one.modules) == {"one.py", "shared.py", "deep.py"}
+    assert set(two.modules) == {"two.py", "shared.py", "deep.py"}
+    assert one.libraries == {"numpy", "scipy"}
+    assert two.libraries == {"numpy", "scipy", "mujoco"}
+
+
+@pytest.mark.parametrize(
+    ("changed", "again"),
+    [
+        ("one.py", "one"),
+        ("two.py", "two"),
+        ("other.py", ""),
+        ("shared.py", "one two"),
+        ("deep.py", "one two"),
+        ("data.yaml", "one two"),
+    ],
+)
+def test_a_figure_is_made_again_where_its_sources_change(tmp_path, monkeypatch, changed, again):
+    package(tmp_path, monkeypatch)
+    digests = lambda: {n: sources_of(tmp_path / f"{n}.py").digest() for n in ("one", "two")}  # noqa: E731
+    before = digests()
+    with (tmp_path / changed).open("a") as file:
+        file.write("# changed\n")
+    sources._imports.cache_clear()
+    after = digests()
+    assert " ".join(name for name in before if before[name] != after[name]) == again
+
+
+def test_installing_an_extra_concerns_only_the_figures_that_use_it(tmp_path, monkeypatch):
+    package(tmp_path, monkeypatch)
+    one, two = (sources_of(tmp_path / f"{name}.py") for name in ("one", "two"))
+    before = one.digest(), two.digest()
+    version = sources._version
+    monkeypatch.setattr(sources, "_version", lambda n: "9" if n == "mujoco" else version(n))
+    assert one.digest() == before[0]
+    assert two.digest() != before[1]
+
+
+def test_parts_of_the_paper_declare_the_extras_they_use():
+    """Only the comparison with the engine needs more than quietbus itself does."""
+    paper = load_paper("zhang2012")
+    text = (ROOT / "reproduce" / "zhang2012" / "engine.py").read_text()
+    assert "quietbus.validate" in text
+    for part in paper.parts:
+        found = sources_of(inspect.getfile(part.make))
+        assert ("mujoco" in found.libraries) == ("mujoco" in part.needs), part.name
+        assert not {"cli", "report", "tables.py"} & {n.partition("/")[0] for n in found.modules}
+        assert "dynamics/equations.py" in found.modules
+
+
+def test_missing_extra_is_told_before_anything_is_computed(small, tmp_path):
+    first, second = small.paper.chapters["Second"]
+    needing = replace(second, needs={"no_such_module": "validate"})
+    small.paper.chapters["Second"] = (first, needing)
+    with pytest.raises(MissingExtra, match=r"three needs no_such_module: pip install 'quietbus\[v"):
+        reproduce(small.paper, tmp_path)
+    assert not small.calls
+    outcome = reproduce(small.paper, tmp_path, partial=True)
+    assert outcome.made == ("one", "two")
+    assert "needs no_such_module" in outcome.failed["three"]
+    small.paper.chapters["Second"] = (first, second)
+    assert reproduce(small.paper, tmp_path).made == ("three",)
+    small.paper.chapters["Second"] = (first, needing)  # made before: nothing is missing
+    assert reproduce(small.paper, tmp_path).made == ()
 
 
 def test_a_figure_that_fails_leaves_the_others_and_is_named(small, tmp_path):

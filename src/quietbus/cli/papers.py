@@ -22,6 +22,9 @@ def reproduce(
     fresh: Annotated[
         bool, typer.Option("--fresh", help="Make everything again, also what is made already.")
     ] = False,
+    partial: Annotated[
+        bool, typer.Option("--partial", help="Go on without figures whose extras are missing.")
+    ] = False,
 ) -> None:
     """Make every figure and number of a paper again; what is made is kept for the next start."""
     from quietbus.reproduce import PAPERS
@@ -32,11 +35,14 @@ def reproduce(
     import_heavy()
     from quietbus.reproduce import load_paper
     from quietbus.reproduce.pages import verdicts_table
+    from quietbus.reproduce.paper import MissingExtra
     from quietbus.reproduce.paper import reproduce as make
 
     with keeping_results(), fraction() as tell, notes():
         try:
-            outcome = make(load_paper(paper), output, tell, fresh)
+            outcome = make(load_paper(paper), output, tell, fresh, partial)
+        except MissingExtra as error:
+            fail(f"{error}, or make the others alone with --partial; nothing is computed yet")
         except OSError as error:
             raise BadInput(f"{output}: cannot be written: {error.strerror or error}") from None
     print_table(verdicts_table(outcome.table))

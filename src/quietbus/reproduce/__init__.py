@@ -4,7 +4,7 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from quietbus.reproduce.paper import Paper
+    from quietbus.reproduce.parts import Paper
 
 PAPERS = {"zhang2012": "quietbus.reproduce.zhang2012"}
 

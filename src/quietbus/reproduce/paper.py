@@ -1,62 +1,29 @@
 """Make a paper's figures and numbers again, each once: what is made is kept and not made twice."""
 
 import hashlib
-import importlib.metadata
+import importlib.util
+import inspect
 import json
 import math
 import os
 import pathlib
 import traceback
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
 from typing import Any
-
-from matplotlib.figure import Figure
 
 import quietbus
 from quietbus.plots.style import save_figures, style
-from quietbus.reproduce.claims import Claim
 from quietbus.reproduce.pages import report_page, table_page
+from quietbus.reproduce.parts import Findings, Paper, Part
+from quietbus.reproduce.sources import sources_of
 from quietbus.writing import UNFINISHED, write_json, write_text
 
 Tell = Callable[[str, float], None]  # what is being done, and how far it is, 0 to 1
-NOT_COMPUTED_WITH = ("cli", "tables.py", "report")  # sources that no number depends on
-LIBRARIES = ("jax", "diffrax", "equinox", "numpy", "scipy", "matplotlib", "control", "mujoco")
 
 
-@dataclass(frozen=True)
-class Findings:
-    """What one part found: a picture and its caption, numbers, and words."""
-
-    figure: Figure
-    caption: str
-    numbers: Mapping[str, float] = field(default_factory=dict)
-    text: str = ""  # Markdown, before the picture
-
-
-@dataclass(frozen=True)
-class Part:
-    """One figure with the numbers that come with it."""
-
-    name: str  # of its file
-    title: str
-    make: Callable[[Any], Findings]  # from the paper's bench
-
-
-@dataclass(frozen=True)
-class Paper:
-    """A paper: its published numbers, and the parts that make them again."""
-
-    name: str
-    reference: str
-    claims: Sequence[Claim]
-    chapters: Mapping[str, Sequence[Part]]  # by heading
-    bench: Callable[["Workshop"], Any]  # what the parts share, computed when first asked for
-
-    @property
-    def parts(self) -> list[Part]:
-        """All parts in order."""
-        return [part for parts in self.chapters.values() for part in parts]
+class MissingExtra(ImportError):
+    """A library that a part needs is not installed; the message says how to get it."""
 
 
 @dataclass
@@ -83,15 +50,18 @@ class Outcome:
 
 
 class Workshop:
-    """The output folder, the hash that what is kept must carry, and how to tell progress."""
+    """The output folder, the hashes that what is kept must carry, and how to tell progress."""
 
     def __init__(self, folder: pathlib.Path, tell: Tell):
         self.folder, self.tell = folder, tell
-        self.key = fingerprint()
         self.store = folder / ".made"
         self.store.mkdir(parents=True, exist_ok=True)
         for left in (*folder.glob(UNFINISHED), *self.store.glob(UNFINISHED)):
             left.unlink()
+
+    def key(self, maker: Callable[..., Any] | type) -> str:
+        """Hash of all that a function or class depends on: sources, scenarios, libraries."""
+        return sources_of(inspect.getfile(maker)).digest()
 
     def kept(self, part: Part) -> Made | None:
         """What is kept of a part, if it is whole and of the same inputs and sources."""
@@ -100,7 +70,7 @@ class Workshop:
             whole = _hash((self.folder / made.file).read_bytes()) == made.picture
         except (OSError, ValueError, TypeError):
             return None
-        return made if whole and made.key == self.key else None
+        return made if whole and made.key == self.key(part.make) else None
 
     def keep(self, part: Part, found: Findings) -> Made:
         """Write a part's picture and numbers, each whole or not at all.
@@ -116,13 +86,17 @@ class Workshop:
         with style():
             save_figures({part.name: found.figure}, self.folder)
         picture = (self.folder / file).read_bytes()
-        made = Made(self.key, file, _hash(picture), found.caption, found.text, numbers)
+        made = Made(self.key(part.make), file, _hash(picture), found.caption, found.text, numbers)
         write_json(self.store / f"{part.name}.json", asdict(made))
         return made
 
 
 def reproduce(
-    paper: Paper, folder: str | os.PathLike[str], tell: Tell | None = None, fresh: bool = False
+    paper: Paper,
+    folder: str | os.PathLike[str],
+    tell: Tell | None = None,
+    fresh: bool = False,
+    partial: bool = False,
 ) -> Outcome:
     """Make all figures, ``table.json``, ``table.md`` and ``report.md`` of a paper.
 
@@ -134,8 +108,10 @@ def reproduce(
         folder: for the results; made if it is not there.
         tell: called with what is being done and how far it is (0 to 1).
         fresh: make everything again.
+        partial: make what can be made where a part needs a library that is not installed.
 
     Raises:
+        MissingExtra: such a library, unless ``partial``; nothing has been computed then.
         OSError: the folder cannot be written.
     """
     tell = tell or (lambda _what, _fraction: None)
@@ -144,6 +120,10 @@ def reproduce(
     if fresh:
         for path in shop.store.iterdir():
             path.unlink()
+    lacking = {part.name: said for part in paper.parts if (said := _lacking(part))}
+    wanted = [part.name for part in paper.parts if part.name in lacking and not shop.kept(part)]
+    if wanted and not partial:
+        raise MissingExtra(f"{wanted[0]} {lacking[wanted[0]]}")
     done: dict[str, Made] = {}
     new: list[str] = []
     failed: dict[str, str] = {}
@@ -155,6 +135,9 @@ def reproduce(
             if kept is not None:
                 done[part.name] = kept
                 continue
+            if part.name in lacking:
+                failed[part.name] = lacking[part.name]
+                continue
             try:
                 with style():
                     found = part.make(bench)
@@ -165,7 +148,8 @@ def reproduce(
                 write_text(shop.store / f"{part.name}.log", traceback.format_exc(), "log")
     except KeyboardInterrupt:
         interrupted = True
-    table = _table(paper, done, failed, shop.key)
+    key = _hash("".join(shop.key(part.make) for part in paper.parts).encode())
+    table = _table(paper, done, failed, key)
     write_json(shop.folder / "table.json", table)
     write_text(shop.folder / "table.md", table_page(table), "Markdown file")
     chapters = {
@@ -175,6 +159,15 @@ def reproduce(
     write_text(shop.folder / "report.md", report_page(table, chapters), "Markdown file")
     kept_names = tuple(name for name in done if name not in new)
     return Outcome(table, tuple(new), kept_names, failed, interrupted)
+
+
+def _lacking(part: Part) -> str:
+    """What a part needs and does not find, in words, or nothing."""
+    missing = [name for name in part.needs if importlib.util.find_spec(name) is None]
+    extras = sorted({part.needs[name] for name in missing})
+    if not missing:
+        return ""
+    return f"needs {', '.join(missing)}: pip install 'quietbus[{','.join(extras)}]'"
 
 
 def _table(
@@ -201,22 +194,6 @@ def _table(
         "findings": findings,
         "failed": [{"name": name, "reason": reason} for name, reason in failed.items()],
     }
-
-
-def fingerprint() -> str:
-    """Hash of version, sources and scenarios of quietbus and of the libraries' versions."""
-    root = pathlib.Path(quietbus.__file__).parent
-    digest = hashlib.sha256(quietbus.__version__.encode())
-    for path in sorted(root.rglob("*")):
-        part = path.relative_to(root)
-        if path.suffix in (".py", ".yaml") and part.parts[0] not in NOT_COMPUTED_WITH:
-            digest.update(str(part).encode() + path.read_bytes())
-    for library in LIBRARIES:
-        try:
-            digest.update(f"{library} {importlib.metadata.version(library)}".encode())
-        except importlib.metadata.PackageNotFoundError:
-            digest.update(f"no {library}".encode())
-    return digest.hexdigest()
 
 
 def _hash(data: bytes) -> str:

@@ -4,7 +4,7 @@ J. Aerospace Engineering 25(4), 641-652. The published numbers are in ``claims.p
 modules make the figures, and our values with them.
 """
 
-from quietbus.reproduce.paper import Paper, Part
+from quietbus.reproduce.parts import Paper, Part
 from quietbus.reproduce.zhang2012 import (
     control,
     engine,
@@ -18,6 +18,8 @@ from quietbus.reproduce.zhang2012 import (
 from quietbus.reproduce.zhang2012.bench import Bench
 from quietbus.reproduce.zhang2012.claims import CLAIMS
 
+ENGINE = {"mujoco": "validate"}  # the library, and the extra that it comes with
+
 PAPER = Paper(
     name="zhang2012",
     reference=(
@@ -29,7 +31,7 @@ PAPER = Paper(
     chapters={
         "The paper's figures": (
             Part("figure-01b", "Figure 1b: frequency response of one strut", control.single_strut),
-            Part("figure-04", "Figure 4: model validation", engine.validation),
+            Part("figure-04", "Figure 4: model validation", engine.validation, ENGINE),
             Part("figure-06", "Figure 6: root locus about x", control.locus),
             Part("figure-07", "Figure 7: Bode plot about x", control.bode),
             Part("figure-08", "Figure 8: Nyquist plot about x", control.nyquist),

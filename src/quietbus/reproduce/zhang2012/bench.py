@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -11,10 +12,12 @@ from scipy.signal import resample_poly
 
 from quietbus import api
 from quietbus.analysis.residual import FINER, residual
-from quietbus.reproduce.paper import Workshop
 from quietbus.results import save_run
 from quietbus.scenario import Scenario, load_scenario
 from quietbus.study import Study
+
+if TYPE_CHECKING:
+    from quietbus.reproduce.paper import Workshop
 
 MOUNTS: tuple[api.Mount, ...] = ("rigid", "isolated")
 Runs = dict[api.Mount, xr.Dataset]
@@ -45,7 +48,7 @@ class Envelope:
 class Bench:
     """The shared results of this paper's parts."""
 
-    shop: Workshop
+    shop: "Workshop"
 
     @cached_property
     def study(self) -> Study:
@@ -63,10 +66,11 @@ class Bench:
         return {}
 
     def _kept_flight(self, name: str) -> Runs:
+        key = self.shop.key(type(self))
         paths = {mount: self.shop.store / f"{name}-{mount}.nc" for mount in MOUNTS}
         try:
             runs = {m: xr.load_dataset(path, engine="h5netcdf") for m, path in paths.items()}
-            if all(run.attrs.get("fingerprint") == self.shop.key for run in runs.values()):
+            if all(run.attrs.get("fingerprint") == key for run in runs.values()):
                 return runs
         except (OSError, ValueError, KeyError):
             pass  # not there, or cut short
@@ -85,7 +89,7 @@ class Bench:
                 raise RuntimeError(f"{name}, {mount}: {run.attrs['stop_reason']}")
         runs = {mount: whole[mount][list(KEPT)] for mount in MOUNTS}
         for mount, run in runs.items():
-            run.attrs["fingerprint"] = self.shop.key
+            run.attrs["fingerprint"] = key
             save_run(run, paths[mount])
         return runs
 

@@ -11,7 +11,7 @@ from quietbus.analysis.loop import PID, Loop, LoopAnalysis, analyze_loop, attitu
 from quietbus.analysis.loop_response import frequency_response, root_locus
 from quietbus.dynamics.linearize import platform_inertia
 from quietbus.plots.style import COLOURS, DASHES, new_figure, share_legend
-from quietbus.reproduce.paper import Findings
+from quietbus.reproduce.parts import Findings
 from quietbus.reproduce.zhang2012.bench import Bench
 
 DAMPING_RATIOS = (0.1, 0.5, 1.0)

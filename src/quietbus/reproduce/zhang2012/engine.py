@@ -12,7 +12,7 @@ from quietbus.dynamics.closed_loop import rotor_angles
 from quietbus.dynamics.equations import Wrench, accelerations
 from quietbus.model.variants import without_rotation
 from quietbus.plots.style import COLOURS, DASHES, new_figure, share_legend
-from quietbus.reproduce.paper import Findings
+from quietbus.reproduce.parts import Findings
 from quietbus.reproduce.zhang2012.bench import Bench
 from quietbus.validate.reference import Reference
 from quietbus.validate.trajectory import fly, fly_mujoco_to, held_gimbals, massless_legs

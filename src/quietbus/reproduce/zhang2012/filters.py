@@ -16,7 +16,7 @@ from quietbus.analysis.filters import (
 from quietbus.build import build_satellite
 from quietbus.model.satellite import Satellite
 from quietbus.plots.style import COLOURS, DASHES, new_figure, share_legend
-from quietbus.reproduce.paper import Findings
+from quietbus.reproduce.parts import Findings
 from quietbus.reproduce.zhang2012.bench import Bench
 from quietbus.scenario import Scenario
 from quietbus.study import at_height

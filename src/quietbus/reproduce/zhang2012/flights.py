@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
 from quietbus.plots.style import COLOURS, DASHES, draw_line, draw_lines, new_figure, share_legend
-from quietbus.reproduce.paper import Findings
+from quietbus.reproduce.parts import Findings
 from quietbus.reproduce.zhang2012.bench import MOUNTS, Bench, Envelope, jitter_of_flight
 from quietbus.reproduce.zhang2012.claims import CLAIMS
 from quietbus.scenario import ScenarioError

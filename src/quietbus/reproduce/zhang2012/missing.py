@@ -15,7 +15,7 @@ from quietbus.dynamics.linearize import linearize
 from quietbus.model.satellite import Satellite
 from quietbus.model.variants import without_rotation
 from quietbus.plots.style import COLOURS, DASHES, MARKERS, draw_line, new_figure, share_legend
-from quietbus.reproduce.paper import Findings
+from quietbus.reproduce.parts import Findings
 from quietbus.reproduce.zhang2012.bench import Bench
 from quietbus.reproduce.zhang2012.control import printed_channel
 from quietbus.study import Study

@@ -13,7 +13,7 @@ from quietbus.model.satellite import Satellite
 from quietbus.model.variants import without_rotation
 from quietbus.platform_study import PlatformStudy
 from quietbus.plots.style import COLOURS, DASHES, MARKERS, new_figure, share_legend
-from quietbus.reproduce.paper import Findings
+from quietbus.reproduce.parts import Findings
 from quietbus.reproduce.zhang2012.bench import Bench
 from quietbus.scenario import Scenario, per_cmg_scenarios
 

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from quietbus import api
 from quietbus.build import build_satellite
 from quietbus.plots.style import COLOURS, DASHES, new_figure, share_legend, span_text
-from quietbus.reproduce.paper import Findings
+from quietbus.reproduce.parts import Findings
 from quietbus.reproduce.zhang2012.bench import Bench, jitter_peak
 from quietbus.scenario import Scenario
 

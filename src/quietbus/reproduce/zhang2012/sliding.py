@@ -7,7 +7,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from quietbus.plots.style import COLOURS, DASHES, draw_line, new_figure, share_legend
-from quietbus.reproduce.paper import Findings
+from quietbus.reproduce.parts import Findings
 from quietbus.reproduce.zhang2012.bench import Bench
 
 STEP = 0.05  # [s] of the central difference that judges both equations
