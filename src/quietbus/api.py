@@ -13,12 +13,14 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from quietbus.arguments import array, choice, flag, function, listing, mapping, positive, vector
 from quietbus.build import build_initial_state, build_satellite
 from quietbus.dynamics.linearize import Actuator, LinearModel, OperatingPoint
 from quietbus.dynamics.linearize import linearize as linearize_satellite
 from quietbus.jitter_study import JitterStudy
 from quietbus.jitter_study import worst_over_phases as worst_phases_at_rest
 from quietbus.platform_study import PlatformStudy
+from quietbus.processes import start_computing
 from quietbus.resolution import refuse_coarse_output, refuse_coarse_tolerance, unseen
 from quietbus.results import (
     aliasing,
@@ -107,7 +109,7 @@ def simulate(
     Raises:
         ScenarioError: the scenario is not valid, or the output rate or tolerance of a direct run
             is too coarse for a declared disturbance.
-        ValueError: an unknown method or mount.
+        TypeError, ValueError: an argument of the wrong kind or value, by its name.
         CheckpointError: (a ValueError) to resume, a checkpoint that cannot be read or is of
             another run; to begin, one that holds a part of this very run.
         OutputError: (an OSError) the checkpoint cannot be begun.
@@ -116,14 +118,19 @@ def simulate(
             ripple; what was computed until then is in its ``run``.
         KeyboardInterrupt: Ctrl-C before anything was computed.
     """
-    if method not in METHODS:
-        raise ValueError(f"method must be one of {', '.join(METHODS)}; got {method!r}")
+    choice("method", method, METHODS)
+    flag("joint_forces", joint_forces)
+    flag("resume", resume)
+    function("progress", progress)
+    points = mapping("points", points, "points of the bus")
+    lines_of_sight = mapping("lines_of_sight", lines_of_sight, "directions or sensitivities")
     if method == "harmonic":
         if joint_forces:
             raise ValueError("joint_forces needs method 'direct'")
-        scenario = _as_run(scenario, mount, duration, output_rate or HARMONIC_RATE)
+        rate = HARMONIC_RATE if output_rate is None else output_rate
+        scenario = _as_run(scenario, mount, duration, rate)
         _tell_implausible(scenario)
-        task = _harmonic_task(scenario, points or {}, lines_of_sight or {})
+        task = _harmonic_task(scenario, points, lines_of_sight)
         run, notes = _kept(_harmonic, task, progress, checkpoint, resume)
     else:
         if points or lines_of_sight:
@@ -164,6 +171,7 @@ def compare(
         progress: called with the mount and the simulated time reached [s].
         checkpoints, resume: as of ``simulate``, a file for each mount.
     """
+    function("progress", progress)
     mounts: tuple[Mount, ...] = ("isolated", "rigid")
     stop, troubles = threading.Event(), list[str]()
 
@@ -278,10 +286,15 @@ def platforms(
         ValueError: a wrong number of gimbal angles, or a satellite that cannot rest.
         ResonanceError: an order of a rotor lies on an undamped mode.
     """
-    loaded = tuple(_as_run(scenario, None, None) for scenario in scenarios)
+    several = listing("scenarios", scenarios, "scenarios, one for each platform")
+    loaded = tuple(_as_run(scenario, None, None) for scenario in several)
     for each in loaded:
         _tell_implausible(each)
-    given: list[Any] = [None] * len(loaded) if gimbal_angles is None else list(gimbal_angles)
+    if not loaded:
+        raise ValueError("scenarios: expected one or more, one for each platform, got none")
+    given: list[Any] = [None] * len(loaded)
+    if gimbal_angles is not None:
+        given = listing("gimbal_angles", gimbal_angles, "lists of angles")
     if len(given) != len(loaded):
         raise ValueError(
             f"gimbal_angles: expected {len(loaded)} lists, one for each scenario, got {len(given)}"
@@ -319,6 +332,8 @@ def verify(
         SimulationError: the run is not complete.
         ValueError, ResonanceError: as of ``simulate``.
     """
+    choice("method", method, METHODS)
+    function("progress", progress)
     scenario = _as_run(scenario, mount, duration, None if method == "harmonic" else output_rate)
     if not scenario.requirements:
         raise ScenarioError(scenario.name, [Problem(NO_REQUIREMENTS, ("requirements",))])
@@ -355,17 +370,17 @@ def linearize(
         ValueError: a value of the wrong kind or shape, or a point that is not an equilibrium.
     """
     scenario = _as_run(scenario, mount, None)
-    if actuator not in ("servo", "ideal"):
-        raise ValueError(f"actuator must be 'servo' or 'ideal', got {actuator!r}")
+    choice("actuator", actuator, ("servo", "ideal"))
+    points = mapping("points", points, "points of the bus")
     _tell_implausible(scenario)
     return linearize_satellite(
         build_satellite(scenario),
         OperatingPoint(
-            _vector("rate", np.zeros(3) if rate is None else rate, 3),
+            vector("rate", np.zeros(3) if rate is None else rate, 3),
             _gimbal_angles(scenario, gimbal_angles),
         ),
         actuator,
-        {name: _vector(f"points[{name!r}]", p, 3) for name, p in (points or {}).items()},
+        {name: vector(f"points[{name!r}]", p, 3) for name, p in points.items()},
     )
 
 
@@ -385,28 +400,21 @@ def _gimbal_angles(scenario: Scenario, angles: ArrayLike | None) -> np.ndarray:
     if angles is not None and isinstance(scenario.cluster, WheelCluster):
         raise ValueError("gimbal angles: expected none, since reaction wheels have no gimbals")
     own = scenario.cluster.gimbal_angles or np.zeros(count)
-    return _vector("gimbal angles", own if angles is None else angles, count)
-
-
-def _vector(name: str, value: ArrayLike, size: int) -> np.ndarray:
-    vector = np.asarray(value, dtype=float)
-    if vector.shape != (size,) or not np.all(np.isfinite(vector)):
-        raise ValueError(f"{name}: expected {size} finite numbers, got {value!r}")
-    return vector
+    return vector("gimbal angles", own if angles is None else angles, count)
 
 
 def _sensitivity(name: str, given: ArrayLike) -> np.ndarray:
     """(3, 12) of a direction, or of a matrix with zero rows for what it does not have."""
-    values = np.asarray(given, dtype=float)
+    values = array(name, given, "3 numbers, or one to three rows of 12")
     if values.ndim < 2:
-        direction = _vector(name, given, 3)
+        direction = vector(name, given, 3)
         if not np.any(direction):
             raise ValueError(f"{name}: expected a direction, got zero")
         return LineOfSight(direction=tuple(direction / np.linalg.norm(direction))).matrix()
     if values.ndim != 2 or not 1 <= len(values) <= 3 or values.shape[1] != 12:
         raise ValueError(f"{name}: expected one to three rows of 12 numbers, got {values.shape}")
-    if not np.all(np.isfinite(values)):
-        raise ValueError(f"{name}: expected finite numbers, got {given!r}")
+    if not np.any(values):
+        raise ValueError(f"{name}: expected a matrix that is not zero")
     return np.pad(values, ((0, 3 - len(values)), (0, 0)))
 
 
@@ -419,8 +427,13 @@ def _as_run(
     """The scenario with what the caller asks for instead of its own values."""
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
-    if mount not in (None, "isolated", "rigid"):
-        raise ValueError(f"mount must be 'isolated' or 'rigid', got {mount!r}")
+    if mount is not None:
+        choice("mount", mount, ("isolated", "rigid"))
+    if duration is not None and not isinstance(duration, str):  # a text may have a unit
+        positive("duration", duration)
+    if output_rate is not None and not isinstance(output_rate, str):
+        positive("output_rate", output_rate)
+    start_computing()
     wanted = {
         "isolator.mount": mount,
         "simulation.duration": duration,
@@ -505,7 +518,7 @@ def _harmonic_task(
     points: Mapping[str, ArrayLike],
     lines_of_sight: Mapping[str, ArrayLike],
 ) -> Task:
-    at = {name: _vector(f"points[{name!r}]", p, 3) for name, p in points.items()}
+    at = {name: vector(f"points[{name!r}]", p, 3) for name, p in points.items()}
     own = {name: line.matrix() for name, line in scenario.lines_of_sight.items()}
     given = own | dict(lines_of_sight)
     lines = {name: _sensitivity(f"lines_of_sight[{name!r}]", each) for name, each in given.items()}

@@ -28,6 +28,8 @@ os.environ.setdefault("EQX_ON_ERROR", "nan")
 import jax  # noqa: E402
 from platformdirs import user_cache_path  # noqa: E402
 
+from quietbus.processes import DeviceError  # noqa: E402
+
 jax.config.update("jax_enable_x64", True)
 
 if jax.config.values["jax_compilation_cache_dir"] is None:
@@ -35,3 +37,12 @@ if jax.config.values["jax_compilation_cache_dir"] is None:
         "jax_compilation_cache_dir", str(user_cache_path("quietbus", appauthor=False) / "jax")
     )
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.3)
+
+if os.environ.get("JAX_PLATFORMS", "cpu") not in ("", "cpu"):
+    try:
+        jax.devices()
+    except (RuntimeError, AssertionError):
+        raise DeviceError(
+            f"JAX_PLATFORMS={os.environ['JAX_PLATFORMS']} asks for a device that JAX does not find "
+            "here; leave it out to compute on the processor"
+        ) from None

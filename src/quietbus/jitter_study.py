@@ -33,6 +33,8 @@ from quietbus.analysis.sweep import (
     bearing_modes,
     critical_speeds,
 )
+from quietbus.arguments import choice, listing, positive
+from quietbus.arguments import count as whole
 from quietbus.build import build_satellite
 from quietbus.dynamics.vibration import NOTHING_SEEN, Vibration
 from quietbus.model.satellite import Satellite
@@ -90,7 +92,7 @@ class JitterStudy:
 
     def satellite(self, mount: str) -> Satellite:
         """Parameters of the model."""
-        return self._satellites[mount]
+        return self._satellites[choice("mount", mount, MOUNTS)]
 
     @cached_property
     def _satellites(self) -> dict[str, Satellite]:
@@ -122,11 +124,12 @@ class JitterStudy:
 
     def bus_rate(self, mount: str) -> np.ndarray:
         """Amplitudes (cmg, order, axis) [rad/s]."""
-        return self.outputs[mount]["bus_rate"]
+        return self.outputs[choice("mount", mount, MOUNTS)]["bus_rate"]
 
     def combined(self, mount: str, output: str = "bus_rate") -> Combined:
         """All rotors and orders together, in the output's unit."""
-        values = self.outputs[mount][output]
+        outputs = self.outputs[choice("mount", mount, MOUNTS)]
+        values = outputs[choice("output", output, list(outputs))]
         phase = np.outer(self.satellite(mount).cluster.rotor_phase, self.orders)
         combined = combine(values, self.frequency, phase)
         noise = self.noise(mount)
@@ -137,7 +140,7 @@ class JitterStudy:
 
         Their ``psd`` has a leading axis of one instant, then frequencies and rotors.
         """
-        return self._noise[mount]
+        return self._noise[choice("mount", mount, MOUNTS)]
 
     @cached_property
     def _noise(self) -> dict[str, Broadband | None]:
@@ -185,16 +188,14 @@ class JitterStudy:
         Raises:
             ValueError: no rotor turns, or the speed is not positive.
         """
+        count = whole("count", count, least=2)
+        if max_speed is not None:
+            positive("max_speed", max_speed)
         own = np.asarray(self.satellite("isolated").cluster.rotor_speed)
         fastest = float(np.max(np.abs(own)))
         if fastest == 0.0:
             raise ValueError("a sweep of the rotors' speed needs one that turns")
         most = SWEPT if max_speed is None else max_speed / fastest
-        if not (np.isfinite(most) and most > 0.0 and count >= 2):
-            raise ValueError(
-                "expected a positive max_speed in rad/s and two speeds or more; got "
-                f"{max_speed} and {count}"
-            )
         factor = np.append(np.geomspace(1e-3, 1.0, count // 2), np.linspace(0, 1, count // 2 + 1))
         factor = np.unique(np.append(most * factor, 1.0 if most >= 1.0 else most))
         modes, critical = {}, {}
@@ -252,7 +253,9 @@ class JitterStudy:
         Raises:
             ScenarioError: the scenario has no such path, or what lies there is not one number.
         """
+        paths = listing("paths", paths, "dotted paths of a scenario's numbers")
         satellite = self.satellite(mount)
+        choice("output", output, list(self.outputs[mount]))
         ways = [self._way(path, mount) for path in paths]
         stacked = jax.tree.map(lambda *each: jnp.stack(each), *ways)
         values = _compiled_derivative(satellite, stacked, self.gimbal_angle, output)

@@ -12,6 +12,7 @@ from quietbus.analysis.coupled import CoupledAnalysis, analyze_coupled
 from quietbus.analysis.jitter import AT_REST, Combined, combine
 from quietbus.analysis.loop import PID
 from quietbus.analysis.platforms import Platforms
+from quietbus.arguments import choice, vector
 from quietbus.build import build_satellite
 from quietbus.scenario import Problem, Scenario, ScenarioError
 from quietbus.scenario.checks import listed
@@ -73,7 +74,7 @@ class PlatformStudy:
 
     def bus_attitude(self, mount: str) -> np.ndarray:
         """Complex amplitudes (cmg, order, axis) [rad], CMGs counted through all platforms."""
-        return self._responses[mount][..., -3:]
+        return self._responses[choice("mount", mount, ("isolated", "rigid"))][..., -3:]
 
     def bus_rate(self, mount: str) -> np.ndarray:
         """Complex amplitudes (cmg, order, axis) [rad/s]."""
@@ -110,7 +111,7 @@ class PlatformStudy:
 
     def static_stroke(self, torque: ArrayLike) -> tuple[np.ndarray, ...]:
         """Strokes (leg,) [m] of each platform's legs as a control torque [N m] sets in."""
-        return self.platforms.strokes(self.platforms.turned(np.asarray(torque, float)))
+        return self.platforms.strokes(self.platforms.turned(vector("torque", torque, 3)))
 
     @property
     def pid(self) -> PID | None:

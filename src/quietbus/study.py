@@ -28,6 +28,7 @@ from quietbus.analysis.loop import (
 )
 from quietbus.analysis.modes import Mode, fixed_base_modes, free_modes
 from quietbus.analysis.transmissibility import Places, Transmissibility, transmissibility
+from quietbus.arguments import array, choice
 from quietbus.build import build_satellite
 from quietbus.dynamics.linearize import (
     AXES,
@@ -92,6 +93,7 @@ class Study:
 
     def linear(self, actuator: Actuator = "servo") -> LinearModel:
         """The free satellite, linearised."""
+        choice("actuator", actuator, ("servo", "ideal"))
         return linearize(self.satellite, self.point, actuator)
 
     @cached_property
@@ -231,6 +233,9 @@ class Study:
 
     def transmissibility(self, frequency_hz: np.ndarray) -> Transmissibility:
         """Transmissibility of the platform on the free satellite at frequencies [Hz]."""
+        frequency_hz = array("frequency_hz", frequency_hz, "frequencies in Hz above 0").reshape(-1)
+        if not np.all(frequency_hz > 0.0):
+            raise ValueError("frequency_hz: expected frequencies above 0 Hz")
         rigid = replace(self.satellite, mount="rigid")
         places = Places(
             mass=float(self.satellite.bus.mass),
@@ -253,6 +258,7 @@ class Study:
         """
         if self.pid is None:
             raise ValueError("limits_by_height: the scenario has no control")
+        heights = array("heights", heights, "heights in m").reshape(-1)
         ends = []
         for height in heights:
             model = linearize(at_height(self.satellite, height), self.point, self._actuator)

@@ -14,6 +14,7 @@ from quietbus.analysis.motion import ImageMotion, Lines, SampledSignal
 from quietbus.analysis.noise import Noise
 from quietbus.analysis.pointing import Statistic, check_stretch, contributions, evaluate
 from quietbus.analysis.windows import MOST_PERIODS, Metric
+from quietbus.arguments import choice, count
 from quietbus.results import AXES, aliasing, scenario_of
 from quietbus.scenario import Problem, Scenario, ScenarioError
 from quietbus.scenario.control import NoSteering
@@ -117,7 +118,7 @@ class Verification:
 
     def motion(self, line_of_sight: str) -> ImageMotion:
         """Image motion of a line of sight [rad]."""
-        return self._motions[line_of_sight]
+        return self._motions[choice("line_of_sight", line_of_sight, list(self._motions))]
 
     @cached_property
     def verdicts(self) -> tuple[Verdict, ...]:
@@ -159,6 +160,8 @@ class Verification:
 
         From a thirtieth to thirty times its window, as far as the judged stretch goes.
         """
+        if count("i", i, least=0) >= len(self.verdicts):
+            raise ValueError(f"i: expected a requirement's number below {len(self.verdicts)}")
         verdict = self.verdicts[i]
         metric = verdict.metric
         if not metric.window:

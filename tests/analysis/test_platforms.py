@@ -306,7 +306,7 @@ def test_what_cannot_be_put_together_is_refused_by_name(paper):
         qb.platforms(parts, [[0.0]])
     with pytest.raises(ValueError, match="expected 1 finite numbers"):
         qb.platforms(parts, [[0.0, 1.0]] * 4)
-    with pytest.raises(ValueError, match="scale: expected a number above 0, got 0"):
+    with pytest.raises(ValueError, match="scale: expected a finite number above 0, got 0"):
         qb.per_cmg_scenarios(paper, scale=0.0)
     law = {"control.steering": {"law": "pseudo_inverse"}}
     with pytest.raises(qb.ScenarioError, match="fewer than three CMGs"):

@@ -186,5 +186,5 @@ def test_lines_of_a_table_meet_the_whirl_that_they_excite():
 
 def test_wrong_input_is_refused(turned):
     for bad in ({"max_speed": -1.0}, {"max_speed": np.nan}, {"count": 1}):
-        with pytest.raises(ValueError, match="expected a positive max_speed"):
+        with pytest.raises(ValueError, match=r"max_speed|count"):
             turned.sweep(**bad)

@@ -270,7 +270,7 @@ def test_samples_of_the_legs_do_not_show():
         ({"lines_of_sight": {"a": [0, 0, 0]}}, "expected a direction, got zero"),
         ({"joint_forces": True}, "joint_forces needs method 'direct'"),
         ({"method": "direct", "points": {"a": [0, 0, 0]}}, "need method 'harmonic'"),
-        ({"method": "spectral"}, "method must be one of direct, harmonic"),
+        ({"method": "spectral"}, "method: expected one of 'direct', 'harmonic'"),
     ],
 )
 def test_wrong_options_are_named(options, message):

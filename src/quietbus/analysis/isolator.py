@@ -19,6 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from quietbus.arguments import array, at_least_zero, positive
+
 CROSSING = math.sqrt(2.0)
 """[-] Frequency ratio above which the isolator isolates, for every damping ratio."""
 
@@ -36,12 +38,9 @@ class SingleAxisIsolator:
     damping: float  # [N s/m]
 
     def __post_init__(self) -> None:
-        if not (self.mass > 0 and self.stiffness > 0 and self.damping >= 0):
-            raise ValueError(
-                "expected a positive mass and stiffness and a damping of at least zero, got "
-                f"mass = {self.mass} kg, stiffness = {self.stiffness} N/m, "
-                f"damping = {self.damping} N s/m"
-            )
+        for name in ("mass", "stiffness"):
+            positive(name, getattr(self, name))
+        at_least_zero("damping", self.damping)
 
     @property
     def natural_frequency(self) -> float:
@@ -71,7 +70,8 @@ class SingleAxisIsolator:
 
     def transmissibility(self, omega: ArrayLike) -> NDArray[np.float64]:
         """abs(G(j omega)) [-] at angular frequencies `omega` [rad/s], any shape."""
-        return transmissibility(np.asarray(omega) / self.natural_frequency, self.damping_ratio)
+        omega = array("omega", omega, "angular frequencies in rad/s")
+        return transmissibility(omega / self.natural_frequency, self.damping_ratio)
 
     def to_control(self) -> Any:
         """The same as a ``control.TransferFunction``."""

@@ -18,6 +18,7 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import fftconvolve
 
 from quietbus.analysis.sweep import SpeedSweep
+from quietbus.arguments import choice, vector
 
 TURNS = 4.0  # of the rotor that one amplitude is taken from; tells orders apart by 0.5
 SAMPLES = 32  # a turn and order
@@ -65,6 +66,11 @@ def compare_run_up(
         ValueError: rotors of different speeds, speeds beyond the map, an order that the map lacks,
             or samples too few for the line.
     """
+    choice("mount", mount, ("isolated", "rigid"))
+    if not isinstance(run, xr.Dataset) or not {"rotor_speed", "time"} <= set(run.variables):
+        raise ValueError("run: expected a run with a run-up, which has rotor_speed over time")
+    choice("signal", signal, [str(name) for name in run.data_vars])
+    vector("order", [order], 1)
     if order not in sweep.orders:
         listed = ", ".join(f"{known:g}" for known in sweep.orders)
         raise ValueError(f"expected an order of the map, one of {listed}; got {order:g}")

@@ -13,6 +13,7 @@ from typer.core import TyperGroup
 from quietbus.cli.given import Asked
 from quietbus.cli.guard import BAD_INPUT, FAILED, BadInput
 from quietbus.cli.session import on_interrupt
+from quietbus.processes import DeviceError
 from quietbus.words import visible_lines
 from quietbus.writing import OutputError
 
@@ -69,7 +70,7 @@ def main() -> None:
     except Exception as error:
         from quietbus.scenario import ScenarioError  # here, so that --help need not load it
 
-        if not isinstance(error, ScenarioError | BadInput):
+        if not isinstance(error, ScenarioError | BadInput | DeviceError):
             raise
         told = Asked.told(error) if isinstance(error, ScenarioError) else error
         print(f"quietbus: {visible_lines(str(told))}", file=sys.stderr)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from quietbus.arguments import count
 from quietbus.analysis.waterfall import (
     ComponentFit,
     FitError,
@@ -185,6 +186,7 @@ def fit_waterfall(maps: xr.Dataset | str | os.PathLike[str], most: int = 20) -> 
         FitError: too few speeds, no order stands out, lines do not have the declared window's
             shape, or what was found does not explain the map; it names the component.
     """
+    count("most", most)
     data = maps if isinstance(maps, xr.Dataset) else read_waterfall(maps)
     fits = {}
     for name in (kind for kind in KINDS if kind in data):

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from quietbus.arguments import path as argument_path
 from quietbus.measured.check import MapCheck, MapError
 from quietbus.scenario import Problem, ScenarioError
 from quietbus.scenario.units import shown
@@ -31,7 +32,7 @@ def read_waterfall(path: str | os.PathLike[str]) -> xr.Dataset:
     Raises:
         MapError: everything wrong with the file.
     """
-    file = Path(path)
+    file = Path(argument_path("path", path))
     if not file.is_file():
         what = "is a folder; expected the file of a map" if file.is_dir() else "no such file"
         raise MapError(str(file), [Problem(what)])

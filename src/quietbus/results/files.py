@@ -13,9 +13,11 @@ import h5netcdf
 import h5py
 import xarray as xr
 
+from quietbus.arguments import path as argument_path
 from quietbus.results.characters import as_characters
 from quietbus.results.checkpoint import is_checkpoint, read, to_run
 from quietbus.results.checks import check_file_parts, check_heaps, check_run
+from quietbus.results.origin import refuse_no_run
 from quietbus.writing import replacing
 
 # behind the end of what HDF5 reads, with the hash of all before; who changes the file cuts it off
@@ -28,6 +30,8 @@ def save_run(run: xr.Dataset, path: str | os.PathLike[str]) -> None:
     Raises:
         OutputError: (an OSError) the file cannot be written, or is no run and so not replaced.
     """
+    path = argument_path("path", path)
+    refuse_no_run(run)
     with replacing(path, "run (NetCDF-4)") as file:
         disk = _Disk(file.raw)
         with h5netcdf.File(disk, "w") as stored:
@@ -146,7 +150,7 @@ def load_run(path: str | os.PathLike[str]) -> xr.Dataset:
         ValueError: the file is not a run of quietbus, or a damaged one; the message says what of
             it is wrong.
     """
-    path = pathlib.Path(path)
+    path = pathlib.Path(argument_path("path", path))
     if path.is_dir():
         raise ValueError(f"{path}: is a folder; expected the file of a run")
     if not path.exists():

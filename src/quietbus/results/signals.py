@@ -4,8 +4,10 @@ import numpy as np
 import xarray as xr
 from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 
+from quietbus.arguments import positive, vector
 from quietbus.results.origin import rotors, scenario_of
 from quietbus.results.schema import JITTER_VARIABLES, VARIABLES
+from quietbus.scenario.limits import MOST_SAMPLES
 
 
 def reconstruct(
@@ -32,6 +34,7 @@ def reconstruct(
     Raises:
         ValueError: a run that is not harmonic, an unknown name, or times outside the run.
     """
+    scenario = scenario_of(run)
     known = [each for each in JITTER_VARIABLES if f"{each}_jitter_phase" in run]
     if name not in known:
         raise ValueError(
@@ -39,18 +42,23 @@ def reconstruct(
             + (f"it has that of {', '.join(known)}" if known else "its method is not 'harmonic'")
         )
     time = run["time"].to_numpy()
-    around = float(time[-1] - span / 2) if around is None else around
+    positive("span", span)
+    if rate is not None:
+        positive("rate", rate)
+    around = float(time[-1] - span / 2 if around is None else vector("around", [around], 1)[0])
     if not time[0] <= around <= time[-1] or not span > 0.0:
         raise ValueError(
             f"expected a stretch of positive length around a time from {time[0]:g} s to "
             f"{time[-1]:g} s; got {span:g} s around {around:g} s"
         )
-    speed, phase = rotors(scenario_of(run))
+    speed, phase = rotors(scenario)
     if "rotor_speed" in run:
         speed = run["rotor_speed"].to_numpy()
     orders = run["order"].to_numpy()
     fastest = max(orders) * np.max(np.abs(speed)) / (2.0 * np.pi)
-    rate = rate or 40.0 * max(fastest, 1.0)
+    rate = 40.0 * max(fastest, 1.0) if rate is None else rate
+    if span * rate > MOST_SAMPLES:
+        raise ValueError(f"rate: expected at most {MOST_SAMPLES / span:.3g} Hz, got {rate:g}")
     first, last = max(time[0], around - span / 2), min(time[-1], around + span / 2)
     t = first + np.arange(int((last - first) * rate) + 1) / rate
     amplitude, shift = (run[f"{name}_jitter_{part}"] for part in ("amplitude", "phase"))

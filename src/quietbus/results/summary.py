@@ -43,7 +43,11 @@ def summarize(run: xr.Dataset, worst_phases_rate: np.ndarray | None = None) -> S
     Args:
         worst_phases_rate: of a direct run, as of ``quietbus.worst_over_phases``, which computes
             it; a harmonic run knows it.
+
+    Raises:
+        TypeError, ValueError: not a run.
     """
+    scenario = scenario_of(run)
     time = run["time"].to_numpy()
     peak = lambda name: float(np.max(np.abs(run[name].to_numpy())))  # noqa: E731
     error = np.linalg.norm(run["attitude_error"].to_numpy(), axis=1)
@@ -58,7 +62,7 @@ def summarize(run: xr.Dataset, worst_phases_rate: np.ndarray | None = None) -> S
         note = f"envelope from t = {time[last][0]:.4g} s to {time[-1]:.4g} s"
         if "bus_rate_noise_rms" in run:
             note += "; the rotors' noise is in the RMS alone"
-    elif not aliasing(scenario_of(run)):
+    elif not aliasing(scenario):
         try:
             rest = residual(time, run["bus_rate"].to_numpy())
             jitter, rms, slow = rest.jitter_peak, rest.jitter_rms, rest.slow

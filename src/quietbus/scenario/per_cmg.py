@@ -6,10 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from quietbus.arguments import positive
 from quietbus.scenario.disturbance import Disturbance
 from quietbus.scenario.errors import Problem, ScenarioError
 from quietbus.scenario.schema import Scenario
 from quietbus.scenario.wheels import WheelCluster
+from quietbus.words import shown
 
 
 def per_cmg_scenarios(scenario: Scenario, scale: float | None = None) -> list[Scenario]:
@@ -37,6 +39,8 @@ def per_cmg_scenarios(scenario: Scenario, scale: float | None = None) -> list[Sc
         ScenarioError: the steering law is the pseudo-inverse, which no CMG alone can follow; or
             the units are reaction wheels.
     """
+    if not isinstance(scenario, Scenario):
+        raise TypeError(f"scenario: expected a Scenario, got {shown(scenario)}")
     if isinstance(scenario.cluster, WheelCluster):
         said = "expected cmg for platforms that stand one under each CMG, got wheel"
         raise ScenarioError(scenario.name, [Problem(said, ("cluster", "type"))])
@@ -44,8 +48,7 @@ def per_cmg_scenarios(scenario: Scenario, scale: float | None = None) -> list[Sc
 
     data, n = scenario.to_dict(), scenario.cluster.count
     scale = n**-0.5 if scale is None else scale
-    if not (np.isfinite(scale) and scale > 0.0):
-        raise ValueError(f"scale: expected a number above 0, got {scale!r}")
+    positive("scale", scale)
     share = 1.0 / n
     isolator = data["isolator"]
     base = Rotation.from_euler("ZYX", isolator.get("orientation", [0.0, 0.0, 0.0])[::-1])

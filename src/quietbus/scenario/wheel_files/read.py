@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
+from quietbus.arguments import listing
+from quietbus.arguments import path as argument_path
 from quietbus.scenario.wheel_files import forty_two, headed, s2e
 from quietbus.scenario.wheel_files.lines import COMMENTS, Line, Problems, read_lines
 from quietbus.scenario.wheel_files.table import KINDS, Row, WheelTable, merged
@@ -17,7 +19,7 @@ _WORD = re.compile(r"[^\W\d]{2}")  # which no number has
 
 
 def read_wheel_table(
-    path: Name | Iterable[Name], kind: str | None = None, wheel: str | None = None
+    path: Name | Sequence[Name], kind: str | None = None, wheel: str | None = None
 ) -> WheelTable:
     """Read a harmonic table; its layout is recognised by its content.
 
@@ -35,7 +37,8 @@ def read_wheel_table(
     """
     if kind is not None and kind not in KINDS:
         raise ValueError(f"kind: expected one of {', '.join(KINDS)}, got {kind!r}")
-    files = [Path(path)] if isinstance(path, str | os.PathLike) else [Path(each) for each in path]
+    given = [path] if isinstance(path, str | os.PathLike) else listing("path", path, "files")
+    files = [Path(argument_path("path", each)) for each in given]
     if not files:
         raise ValueError("path: expected a file or several, got none")
     if len(files) == 1:
