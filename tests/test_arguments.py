@@ -89,6 +89,7 @@ WRONG = [  # call, what the message names
     (lambda: qb.save_run(RUN, "x.nc"), "run: expected a run of quietbus, got a Dataset without"),
     (lambda: qb.summarize(5), "run: expected a run"),
     (lambda: qb.summarize(RUN), "run: expected a run of quietbus"),
+    (lambda: qb.worst_over_phases(5), "run: expected a run"),
     (lambda: qb.scenario_of("x"), "run: expected a run"),
     (lambda: qb.reconstruct(5), "run: expected a run"),
     (lambda: qb.compare_run_up(RUN, STUDY, "soft"), "mount: expected one of"),

@@ -217,12 +217,13 @@ def worst_over_phases(run: xr.Dataset) -> np.ndarray | None:
     a direct one by the harmonic view of the satellite at rest, with the gimbal angles and rotor
     speeds of the end. None where there is no such steady motion. `summarize` takes it.
     """
+    scenario = scenario_of(run)
     if run.attrs["method"] == "harmonic":
         return summarize(run).worst_phases_rate
     last = run.isel(time=-1)
     speed = last["rotor_speed"].to_numpy() if "rotor_speed" in run else None
     angles = last["gimbal_angle"].to_numpy()
-    return worst_phases_at_rest(scenario_of(run), run.attrs["mount"], angles, speed)
+    return worst_phases_at_rest(scenario, run.attrs["mount"], angles, speed)
 
 
 def analyze(scenario: Scenario | str, gimbal_angle: ArrayLike | None = None) -> Study:
