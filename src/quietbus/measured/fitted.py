@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from quietbus.arguments import count
 from quietbus.analysis.waterfall import (
     ComponentFit,
     FitError,
@@ -19,6 +18,7 @@ from quietbus.analysis.waterfall import (
     fit,
     transmission,
 )
+from quietbus.arguments import count
 from quietbus.measured.read import read_waterfall
 from quietbus.measured.units import PSD
 from quietbus.scenario.text import write_yaml
