@@ -215,7 +215,7 @@ def worst_over_phases(run: xr.Dataset) -> np.ndarray | None:
 
     The sum of the amplitudes of all rotors' lines, noise left out: of a harmonic run as it is, of
     a direct one by the harmonic view of the satellite at rest, with the gimbal angles and rotor
-    speeds of the end. None where there is no such steady motion. `summarize` takes it.
+    speeds of the end. None where there is no such steady motion.
     """
     scenario = scenario_of(run)
     if run.attrs["method"] == "harmonic":

@@ -64,7 +64,7 @@ def test_numbers_are_those_of_the_summary():
     run = synthetic()
     summary = summarize(run)
     shown = cells(report_page(run), "Residual motion from t = ")
-    assert len(shown) == 14
+    assert len(shown) == 15
     for i, axis in enumerate("xyz"):
         assert shown[f"rate jitter {axis}, peak"] == [
             "deg/s",
@@ -195,7 +195,7 @@ def test_report_s_table_is_that_of_simulate(command, tmp_path):
     shown = cells(page, "Residual motion from t = 0.45 s to 0.95 s")
     lines = [re.split(r"\s{2,}", line.strip()) for line in printed.splitlines()]
     assert shown == {line[0]: line[1:] for line in lines if len(line) == 3}
-    assert len(shown) == 14
+    assert len(shown) == 19
 
 
 def test_report_with_failed_checks_is_written_and_ends_with_status_1(

@@ -72,7 +72,7 @@ def simulate(
         raise BadInput("--joint-forces needs the isolated mount: a rigid one leaves them open")
     import_heavy()
     from quietbus import api
-    from quietbus.results import summarize
+    from quietbus.results import summarize, with_worst_phases
     from quietbus.results.checkpoint import CheckpointError
     from quietbus.solve.harmonic import ResonanceError
     from quietbus.tables import summary_table
@@ -96,12 +96,14 @@ def simulate(
                 run, failed = error.run, str(error)
             except ResonanceError as error:
                 raise BadInput(f"{scenario}: {error}") from None
+        if run.attrs["status"] == "complete":
+            run = with_worst_phases(run, api.worst_over_phases(run))
         troubles = save(run, output)
         if not troubles and run.attrs["status"] != "interrupted":
             checkpoint.unlink(missing_ok=True)
     if run.sizes["time"] > 1:
         show_as_read(checked)
-        print_table(summary_table({chosen: summarize(run, api.worst_over_phases(run))}))
+        print_table(summary_table({chosen: summarize(run)}))
     else:
         print("one instant only, so there is no table")
     if run.attrs["status"] != "complete":
@@ -144,7 +146,7 @@ def compare(
     import_heavy()
     from quietbus import api
     from quietbus.plots import compare_figures, run_figures, save_figures
-    from quietbus.results import summarize
+    from quietbus.results import summarize, with_worst_phases
     from quietbus.results.checkpoint import CheckpointError
     from quietbus.tables import summary_table
 
@@ -160,6 +162,11 @@ def compare(
             except CheckpointError as error:
                 raise BadInput(str(error)) from None
         troubles = []
+        if not Stop.asked:
+            runs = {
+                mount: with_worst_phases(run, api.worst_over_phases(run))
+                for mount, run in runs.items()
+            }
         for mount, run in runs.items():
             troubles += save(run, files[Mount(mount)])
         if not troubles and not Stop.asked:
@@ -172,9 +179,7 @@ def compare(
         print(f"no pictures of an interrupted comparison; `quietbus plot {output}/isolated.nc`")
         troubles.append("the same command with --resume goes on from there")
     elif all(run.sizes["time"] > 1 for run in runs.values()):
-        summaries = {
-            str(mount): summarize(run, api.worst_over_phases(run)) for mount, run in runs.items()
-        }
+        summaries = {str(mount): summarize(run) for mount, run in runs.items()}
         show_as_read(checked)
         print_table(summary_table(summaries))
         numbers = {mount: summary.to_dict() for mount, summary in summaries.items()}

@@ -16,3 +16,4 @@ from quietbus.results.summary import Summary as Summary
 from quietbus.results.summary import aliasing as aliasing
 from quietbus.results.summary import rotor_notes as rotor_notes
 from quietbus.results.summary import summarize as summarize
+from quietbus.results.summary import with_worst_phases as with_worst_phases

@@ -46,6 +46,7 @@ ROTOR_VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "rotor_speed": (("cmg",), "rad/s", "rotor speeds, relative to the unit's body"),
     "rotor_torque": (("cmg",), "N m", "torque of the motor on its rotor"),
 }
+WORST_PHASES = "worst_phases_rate"  # of runs that a command has written
 JOINT_VARIABLES = {
     "spherical_force": (
         ("leg", "axis"),
@@ -84,10 +85,12 @@ COMBINED = {
 
 def described(name: str) -> tuple[tuple[str, ...], str] | None:
     """Dimensions and unit of a variable by its name, None of one that no run has."""
-    for table in (VARIABLES, ROTOR_VARIABLES, JOINT_VARIABLES):
+    for table in (VARIABLES, CONTROL_VARIABLES, ROTOR_VARIABLES, JOINT_VARIABLES):
         if name in table:
             inner, unit, _ = table[name]
             return ("time", *inner), unit
+    if name == WORST_PHASES:
+        return ("axis",), "rad/s"
     if name == "jitter_change_error":
         return ("time",), "1"
     if name == "line_of_sight_cospectrum":

@@ -8,6 +8,7 @@ import xarray as xr
 
 from quietbus.analysis.residual import residual, shows
 from quietbus.results.origin import rotors, scenario_of
+from quietbus.results.schema import WORST_PHASES
 from quietbus.scenario import Scenario
 from quietbus.scenario.wheels import WheelCluster
 
@@ -37,17 +38,27 @@ class Summary:
         return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in fields}
 
 
-def summarize(run: xr.Dataset, worst_phases_rate: np.ndarray | None = None) -> Summary:
-    """The numbers of a run (see ``Summary``).
+def with_worst_phases(run: xr.Dataset, rate: np.ndarray | None) -> xr.Dataset:
+    """A direct run with its jitter for the worst rotor phases, where that is known.
 
     Args:
-        worst_phases_rate: of a direct run, as of ``quietbus.worst_over_phases``, which computes
-            it; a harmonic run knows it.
+        rate: (3,) [rad/s], as of ``quietbus.worst_over_phases``.
+    """
+    if rate is None or run.attrs["method"] == "harmonic":
+        return run
+    meaning = "sum of the amplitudes of the bus rate's lines at the end, any rotor phases"
+    described = {"units": "rad/s", "long_name": meaning}
+    return run.assign({WORST_PHASES: (("axis",), rate, described)})
+
+
+def summarize(run: xr.Dataset) -> Summary:
+    """The numbers of a run (see ``Summary``).
 
     Raises:
         TypeError, ValueError: not a run.
     """
     scenario = scenario_of(run)
+    worst_phases_rate = run[WORST_PHASES].to_numpy() if WORST_PHASES in run else None
     time = run["time"].to_numpy()
     peak = lambda name: float(np.max(np.abs(run[name].to_numpy())))  # noqa: E731
     error = np.linalg.norm(run["attitude_error"].to_numpy(), axis=1)

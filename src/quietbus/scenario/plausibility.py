@@ -358,4 +358,4 @@ def _attitudes(scenario: Scenario) -> Iterator[tuple[str, str]]:
 def _like_degrees(angle: float) -> bool:
     """A large angle whose number of radians is round, and that of degrees is not."""
     is_round = lambda value: abs(value - round(value, 2)) < 1e-9  # noqa: E731
-    return abs(angle) >= 0.5 and is_round(angle) and not is_round(DEG * angle)
+    return abs(angle) >= 1.0 and is_round(angle) and not is_round(DEG * angle)
