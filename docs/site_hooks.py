@@ -1,6 +1,5 @@
 """What MkDocs does for this site beyond its plugins; see ``hooks`` in mkdocs.yml."""
 
-import ast
 import html
 import re
 from pathlib import Path
@@ -55,22 +54,6 @@ def on_files(files, config):
 def _on_site(link):
     path, anchor, heading = link.partition("#")
     return FROM_ROOT.get(path, path.removeprefix("docs/")) + anchor + heading
-
-
-def on_page_markdown(markdown, page, **_):
-    """The reference has every public name: those that the page itself does not list come last."""
-    if page.file.src_uri != "api.md":
-        return markdown
-    listed = re.findall(r"^::: quietbus\.(\w+)$", markdown, re.MULTILINE)
-    others = [f"::: quietbus.{name}" for name in public_names() if name not in listed]
-    return "\n\n".join([markdown, *(["## More", *others] if others else [])])
-
-
-def public_names():
-    """The names that ``import quietbus`` offers, in the order of its stub."""
-    stub = ast.parse((ROOT / "src/quietbus/__init__.pyi").read_text(encoding="utf-8"))
-    imports = [node for node in stub.body if isinstance(node, ast.ImportFrom)]
-    return [name.asname or name.name for node in imports for name in node.names]
 
 
 def on_page_content(content, page, **_):

@@ -11,6 +11,7 @@ import typer
 
 import quietbus as qb
 from quietbus import cli
+from quietbus.analysis.windows import METRICS
 from quietbus.results import CONTROL_VARIABLES, JOINT_VARIABLES, ROTOR_VARIABLES, VARIABLES, Summary
 from quietbus.scenario import builtin_names
 from quietbus.scenario.base import Count, Part
@@ -179,6 +180,21 @@ def test_scenario_page_names_every_choice():
     page = _text("docs/scenario.md")
     for word in (*LAWS, "isolated", "rigid", "bus", "plate", "body", "inertial", "constant"):
         assert f"`{word}`" in page
+
+
+def test_glossary_names_what_exists():
+    known = {key for key, _ in _keys(qb.Scenario)} | set(METRICS) | {"jitter_change_error"}
+    known |= set(VARIABLES | ROTOR_VARIABLES | JOINT_VARIABLES)
+    known |= {f"quietbus {name}" for name in typer.main.get_command(cli.app).commands} | {
+        f"qb.{name}" for name in qb.__all__
+    }
+    known |= {f"NAME_jitter_{kind}" for kind in ("amplitude", "phase", "envelope")}
+    known |= {f"NAME_jitter_{kind}" for kind in ("worst_case", "rss", "rms")}
+    rows = _rows(_text("docs/glossary.md"), ("word", "meaning", "in quietbus"))
+    assert len({word for word, _, _ in rows}) == len(rows)
+    for word, _, where in rows:
+        for name in re.findall(r"`([^`]+)`", where):
+            assert name in known, f"{word}: {name}"
 
 
 def _keys(model: type[Part], prefix: str = ""):
