@@ -243,13 +243,21 @@ def test_command_prints_tables_and_draws(tmp_path, capsys):
 
 def test_critical_speeds_are_told_of_wheels_too(numbers):
     """Wheels have no gimbal angles to be worst at, but speeds to keep away from."""
-    *_, table = jitter_tables(numbers | {"worst": {}, "gimbal_angle_deg": []})
+    _, table, *_ = jitter_tables(numbers | {"worst": {}, "gimbal_angle_deg": []})
     assert table.title.startswith("Critical speeds on the platform, up to 7200 rpm")
     assert table.row_count > 0
-    assert [each.title.split(":")[0] for each in jitter_tables(numbers)][-2:] == [
-        "Worst gimbal angles",
-        "Critical speeds on the platform, gimbals held, up to 7200 rpm",
-    ]
+    titles = [each.title.split(":")[0] for each in jitter_tables(numbers)]
+    assert titles[1] == "Critical speeds on the platform, gimbals held, up to 7200 rpm"
+    assert titles[-1] == "Worst gimbal angles"
+
+
+def test_speeds_to_keep_away_from_come_first_and_those_without_a_peak_are_counted(numbers):
+    found = [c for c in numbers["sweep"]["isolated"]["critical_speeds"] if c["excited"]]
+    sharp = [c for c in found if 0.5 / c["damping"] >= 2.0]
+    assert 0 < len(sharp) < len(found)
+    _, table, *_ = jitter_tables(numbers)
+    assert table.row_count == len(sharp)
+    assert f"{len(found) - len(sharp)} of modes damped to a Q below 2" in table.caption
 
 
 @pytest.mark.parametrize(

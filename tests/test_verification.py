@@ -134,7 +134,7 @@ def test_pictures(camera):
     figures = pointing_figures(camera)
     assert set(figures) == {"cumulative-camera", "exposure"}
     named = [text.get_text() for text in figures["cumulative-camera"].legends[0].get_texts()]
-    assert {"rotor 0, 1Ω, 100 Hz", "all", "slow motion, trend off"} <= set(named)
+    assert {"rotor 0, 1Ω, 100 Hz", "all", "slow motion, less its cubic trend"} <= set(named)
     for figure in figures.values():
         assert any("[" in axes.get_xlabel() for axes in figure.axes)
     windows, values = camera.curve(1)

@@ -223,6 +223,7 @@ class JitterStudy:
             critical,
             bearing_modes(own_rotors),
             inner,
+            () if self.wheels else tuple(self.gimbal_angle),
         )
 
     def _at_speeds(

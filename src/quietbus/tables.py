@@ -310,7 +310,6 @@ def jitter_tables(numbers: Mapping[str, Any]) -> Iterator[Table]:
         lines.caption = f"no rotor shakes the bus by more than {NOISE:g} deg/s"
     elif len(shaken) < len(numbers["orders"]):
         lines.caption = f"orders below {NOISE:g} deg/s left out"
-    yield lines
 
     combined = numbers["combined"]
     together = _titled("All rotors and orders together")
@@ -337,6 +336,9 @@ def jitter_tables(numbers: Mapping[str, Any]) -> Iterator[Table]:
                     *both,
                 )
     yield together
+    if numbers["sweep"] is not None:
+        yield critical_table(numbers["sweep"], "gimbals held, " if numbers["worst"] else "")
+    yield lines
 
     own = numbers["mount"]
     parts = _titled(f"Budget, {own}: bus rate by rotor and kind of imbalance, in deg/s")
@@ -351,8 +353,9 @@ def jitter_tables(numbers: Mapping[str, Any]) -> Iterator[Table]:
 
     if numbers["worst"]:
         yield _worst_angles(numbers["worst"])
-    if numbers["sweep"] is not None:
-        yield critical_table(numbers["sweep"], "gimbals held, " if numbers["worst"] else "")
+
+
+LEAST_Q = 2.0  # [-] quality factor from which a critical speed is one to keep away from
 
 
 def _worst_angles(found_worst: Mapping[str, Any]) -> Table:
@@ -383,8 +386,9 @@ def critical_table(sweep: Mapping[str, Any], held: str) -> Table:
     for column in columns:
         table.add_column(column, justify="right")
     table.add_column("mode", overflow="fold")
-    shown = [critical for critical in found if critical["excited"]]
-    for critical in shown:
+    excited = [critical for critical in found if critical["excited"]]
+    shown = [critical for critical in excited if critical["amplification"] >= LEAST_Q]
+    for critical in sorted(shown, key=lambda critical: -critical["amplification"]):
         table.add_row(
             f"{critical['speed_rpm']:.1f}",
             f"{critical['order']:g}",
@@ -394,9 +398,15 @@ def critical_table(sweep: Mapping[str, Any], held: str) -> Table:
             f"{math.hypot(*critical['bus_rate_amplitude_deg_s']):.2e}",
             critical["mode"],
         )
-    table.caption = "bus rate: norm of the sums of the rotors' amplitudes" if shown else "none"
-    if len(shown) < len(found):
-        table.caption += "; crossings of orders that shake nothing left out"
+    left_out = len(excited) - len(shown)
+    notes = ["bus rate: norm of the sums of the rotors' amplitudes" if shown else "none"]
+    if left_out:
+        notes.append(
+            f"{left_out} of modes damped to a Q below {LEAST_Q:g}, with no peak to speak of"
+        )
+    if len(excited) < len(found):
+        notes.append("crossings of orders that shake nothing")
+    table.caption = f"{notes[0]}; left out: {' and '.join(notes[1:])}" if notes[1:] else notes[0]
     return table
 
 

@@ -8,7 +8,7 @@ import pytest
 from matplotlib.collections import LineCollection
 
 from quietbus.analysis.sweep import SpeedSweep, SpinningModes, critical_speeds
-from quietbus.plots.sweep import NO_JITTER, sweep_figures
+from quietbus.plots.sweep import NO_JITTER, _look_of_order, campbell, sweep_figures
 
 OWN = 2 * np.pi * 50.0
 FACTOR = np.linspace(0.0, 1.2, 121)
@@ -77,11 +77,8 @@ def test_waterfall_colours_every_excited_ray_by_its_amplitude(figures):
 
 def test_amplitudes_over_speed_are_drawn_for_both_mounts(figures):
     axes = figures["speeds"].axes[0]
-    drawn = {line.get_label(): line.get_ydata()[-1] for line in axes.lines}
-    rigid, isolated = (
-        next(value for label, value in drawn.items() if label.startswith("order 1, " + words))
-        for words in ("without", "with platform")
-    )
+    drawn = {line.get_gid(): line for line in axes.lines if line.get_gid()}
+    rigid, isolated = (drawn[f"order 1, {m}"].get_ydata()[-1] for m in ("rigid", "isolated"))
     assert isolated == pytest.approx(0.1 * rigid)
     assert rigid == pytest.approx(1e3 * np.rad2deg(1e-4) * 1.44)  # in 10^-3 deg/s
 
@@ -141,5 +138,18 @@ def test_an_infinite_amplitude_does_not_hide_the_rest():
     )
     drawn = sweep_figures(endless, "endless")["speeds"].axes[0]
     assert drawn.get_ylim()[1] == pytest.approx(2e3 * np.rad2deg(1e-4) * 1.44)
-    line = next(each for each in drawn.lines if "order 1, with platform" in str(each.get_label()))
+    line = next(each for each in drawn.lines if each.get_gid() == "order 1, isolated")
     assert np.isnan(line.get_ydata()).sum() == 1
+
+
+def test_no_order_looks_like_another():
+    looks = [tuple(sorted((k, str(v)) for k, v in _look_of_order(i).items())) for i in range(24)]
+    assert len(set(looks)) == len(looks)
+
+
+def test_campbell_says_where_the_gimbals_are_held():
+    """The modes' split by the rotors' momentum depends on it; wheels have no gimbals."""
+    still = made(1e-4)
+    for angle, words in (((), "speed (a)"), ((1.0, 1.0), "at 57.3°"), ((0.0, 0.5), "at 0, 28.65°")):
+        held = dataclasses.replace(still, gimbal_angle=angle)
+        assert words in campbell(held, "a").get_suptitle()

@@ -244,6 +244,7 @@ class SpeedSweep:
     critical: dict[str, tuple[CriticalSpeed, ...]]  # by mount
     bearings: tuple[BearingMode, ...] = ()  # of rotors with internal modes
     bearing_critical: tuple[CriticalSpeed, ...] = ()
+    gimbal_angle: tuple[float, ...] = ()  # (cmg,) [rad] at which gimbals are held; of wheels none
 
     @property
     def speed(self) -> np.ndarray:

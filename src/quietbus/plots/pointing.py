@@ -6,6 +6,7 @@ import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.ticker import FuncFormatter
 
 from quietbus.analysis.power import Density, LinePower, cumulative
 from quietbus.analysis.spectrum import detrended
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from quietbus.analysis.power import Power
     from quietbus.verification import Verdict, Verification
 
-MOST_NAMED = 10  # contributors in a picture; the others are one
+MOST_NAMED = 8  # contributors in a picture; the others are one
 LEAST_SHARE = 1e-3  # of the RMS of all lines, that a line has to have to be named
 
 
@@ -61,7 +62,7 @@ def powers(motion: ImageMotion, stretch: tuple[float, float]) -> dict[str, Power
         f = np.fft.rfftfreq(len(y), 1.0 / signal.rate)
         density = 2.0 * np.sum(np.abs(np.fft.rfft(w * y, axis=0)) ** 2, axis=1)
         density /= signal.rate * np.sum(w**2)
-        name = "motion" if motion.lines is None else "slow motion, trend off"
+        name = "motion" if motion.lines is None else "slow motion, less its cubic trend"
         parts[name] = Density(f, density)
     if motion.lines is None:
         return parts
@@ -106,7 +107,8 @@ def cumulative_spectrum(title: str, parts: Mapping[str, Power]) -> Figure:
     for axes, each, text in zip(panels, sums, titles, strict=True):
         axes.set_title(text)
         for i, (name, values) in enumerate(each.parts.items()):
-            look: dict[str, Any] = {
+            look: dict[str, Any] = {  # the first ones widest: equal contributors lie on each other
+                "linewidth": 1.0 + 2.5 * (1.0 - i / len(each.parts)),
                 "color": COLOURS[i % (len(COLOURS) - 1)],
                 "linestyle": DASHES[i % len(DASHES)],
             }
@@ -145,9 +147,12 @@ def exposure(verification: Verification) -> Figure:
     panels = figure.subplots(rows, min(2, len(found)), squeeze=False).ravel()
     for axes, (verdict, curve) in zip(panels, found, strict=False):
         _exposure(axes, verdict, *curve)
-    for axes in panels[len(found) :]:
-        axes.set_visible(False)
-    share_legend(figure, panels[0])
+    free = panels[len(found) :]
+    for axes in free:
+        axes.set_axis_off()
+        axes.legend(*panels[0].get_legend_handles_labels(), loc="center")
+    if len(free) == 0:
+        share_legend(figure, panels[0])
     return figure
 
 
@@ -164,14 +169,16 @@ def _exposure(axes: Axes, verdict: Verdict, windows: np.ndarray, values: np.ndar
         "o" if verdict.met else "X",
         color="k",
         markersize=6,
-        label="at the required exposure: value, met (dot) or not met (cross)",
+        label="value at the required exposure:\nmet (dot) or not met (cross)",
     )
     every = np.array([*(verdict.scale * values), value, verdict.shown(verdict.limit)])
     log_scale(axes, 0.5 * float(np.min(every[every > 0.0])), 2.0 * float(np.max(every)))
     axes.set(xscale="log", xlabel="exposure [ms]")
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
     unit = "" if verdict.unit == "1" else f" [{verdict.unit}]"
     axes.set_ylabel(f"{metric.name}{unit or ' [-]'}")
     word = "met" if verdict.met else "NOT MET"
     name, margin = literal(verdict.line_of_sight), verdict.margin_percent
-    said = f"{name}: {value:.3g}, {word}, margin {margin:.3g} %"
+    shown = f"{value:.3g}" if verdict.unit == "1" else f"{value:.3g} {verdict.unit}"
+    said = f"{name}: {shown}, {word}, margin {margin:.3g} %"
     axes.set_title(textwrap.fill(f"{said}; {verdict.meaning}", 46), fontsize=8.5)

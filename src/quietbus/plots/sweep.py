@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.collections import LineCollection
@@ -27,6 +27,7 @@ WIDE = 10.0  # times the slowest mode: a frequency axis longer than this is loga
 UNDAMPED = 1e-8  # of critical: a mode damped less has no steady amplitude
 ENDLESS = 1e6  # times the usual amplitude
 LEAST_SPLIT = 0.01  # [%]
+MOUNT_DASHES = ("-", DASHES[3])  # isolated, rigid
 DECADES = 7.0  # of amplitude that colours tell apart
 NO_JITTER = f"no jitter: the rotors shake the bus by less than {NOISE:g} deg/s at every speed"
 
@@ -47,7 +48,7 @@ def sweep_figures(sweep: SpeedSweep, name: str) -> dict[str, Figure]:
 
 def campbell(sweep: SpeedSweep, name: str) -> Figure:
     """Modes of the satellite on its platform over rotor speed, the orders' rays, and crossings."""
-    figure = new_figure(6.6, f"Modes over rotor speed, gimbals held ({name})")
+    figure = new_figure(6.8, f"Modes over rotor speed{_held(sweep)} ({name})")
     axes, change = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
     shown = sweep.factor > 0.0
     rpm = RPM * sweep.speed[shown]
@@ -98,9 +99,22 @@ def campbell(sweep: SpeedSweep, name: str) -> Figure:
     for panel in (axes, change):
         _mark_own_speed(sweep, panel.axvline)
     legend = axes.get_legend_handles_labels()
-    title = "modes, named as they are with the rotors still"
+    title = (
+        "modes, named as they are with the rotors still; "
+        "where a ray crosses one without a mark, that order does not drive it"
+    )
     figure.legend(*legend, loc="outside lower center", ncols=2, title=title, title_fontsize=8)
     return figure
+
+
+def _held(sweep: SpeedSweep) -> str:
+    """At which angles the gimbals are held, since the modes' split depends on it."""
+    degrees = np.rad2deg(sweep.gimbal_angle)
+    if degrees.size == 0:
+        return ""
+    alike = np.ptp(degrees) < 1e-9
+    angles = f"{degrees[0]:.4g}" if alike else ", ".join(f"{angle:.4g}" for angle in degrees)
+    return f", gimbals held at {angles}°"
 
 
 def _draw_bearings(axes: Axes, sweep: SpeedSweep, shown: np.ndarray) -> np.ndarray:
@@ -181,16 +195,19 @@ def speeds(sweep: SpeedSweep, name: str) -> Figure:
     panels = figure.subplots(3, 1, sharex=True, sharey=True)
     factor, unit = scaled(highest, "deg/s")
     shown = sweep.factor > 0.0
+    excited = np.flatnonzero(np.any([sweep.excited(mount) for mount in LINES], axis=0))
     for i, axes in enumerate(panels):
-        for mount, (label, look) in LINES.items():
-            for o in np.flatnonzero(sweep.excited(mount)):
-                axes.loglog(
-                    RPM * sweep.speed[shown],
-                    factor * sizes[mount][shown, o, i],
-                    color=look["color"],
-                    linestyle=DASHES[o % len(DASHES)],
-                    label=f"order {sweep.orders[o]:g}, {label}",
-                )
+        for k, o in enumerate(excited):
+            look = _look_of_order(k)
+            axes.plot([], [], **look, label=f"order {sweep.orders[o]:g}")
+            for (mount, _), dashes in zip(LINES.items(), MOUNT_DASHES, strict=True):
+                if sweep.excited(mount)[o]:
+                    size = factor * sizes[mount][shown, o, i]
+                    own = {"linestyle": dashes, "gid": f"order {sweep.orders[o]:g}, {mount}"}
+                    axes.plot(RPM * sweep.speed[shown], size, **look | own)
+        for (label, _), dashes in zip(LINES.values(), MOUNT_DASHES, strict=True):
+            axes.plot([], [], color="0.3", linestyle=dashes, label=label)
+        axes.set(xscale="log", yscale="log")
         for c in sweep.critical["isolated"]:
             if sweep.excited("isolated")[sweep.orders.index(c.order)]:
                 at = RPM * c.factor * np.max(np.abs(sweep.rotor_speed))
@@ -209,6 +226,13 @@ def speeds(sweep: SpeedSweep, name: str) -> Figure:
     panels[-1].set_xlabel("rotor speed [rpm]")
     share_legend(figure, panels[0])
     return figure
+
+
+def _look_of_order(k: int) -> dict[str, Any]:
+    """Colour of an order, and from the eighth on marks, so that none looks like another."""
+    turn = k // len(COLOURS)
+    marked = {"marker": "ov^sDPX"[(turn - 1) % 7], "markevery": 0.08, "markersize": 3.5}
+    return {"color": COLOURS[k % len(COLOURS)], "linewidth": 1.1} | (marked if turn else {})
 
 
 def run_up_figure(runs: Mapping[str, RunUp], name: str) -> Figure:
@@ -333,23 +357,32 @@ def _between_decades(value: float, _: object) -> str:
 
 
 def _name_rays(axes: Axes, sweep: SpeedSweep) -> None:
-    """The order on each ray, where the rays are far apart."""
-    low, most = axes.get_xlim()
-    bottom, highest = axes.get_ylim()
+    """The order at each ray's end, outside the axes, where no curve is; labels keep their distance.
+
+    Rays that end at the right are named from the top down, those at the top from right to left.
+    """
+    most, highest = axes.get_xlim()[1], axes.get_ylim()[1]
     fastest = np.max(np.abs(sweep.rotor_speed))
-    for i, (order, speed) in enumerate(_rays(sweep)):
+    fraction = axes.transAxes.inverted()
+    last = {"right": np.inf, "top": np.inf}
+    for order, speed in sorted(_rays(sweep), key=lambda ray: -ray[0] * ray[1]):
         slope = HERTZ * order * speed / (RPM * fastest)  # [Hz/rpm]
         end = min(most, highest / slope)
-        start = max(low, bottom / slope)
-        part = (0.85, 0.7, 0.55)[i % 3]
-        at = start ** (1.0 - part) * end**part if low > 0.0 else part * end
+        x, y = fraction.transform(axes.transData.transform((end, slope * end)))
+        side = "right" if end >= most * (1.0 - 1e-9) else "top"
+        at = min(y if side == "right" else x, last[side] - (0.035 if side == "right" else 0.06))
+        last[side] = at
         axes.annotate(
             f"{order:g}Ω",
-            (at, slope * at),
-            ha="center",
+            (x, y),
+            (1.015, at) if side == "right" else (at, 1.03),
+            xycoords="axes fraction",
+            textcoords="axes fraction",
+            ha="left" if side == "right" else "center",
             va="center",
             fontsize=8,
-            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
+            annotation_clip=False,
+            arrowprops={"arrowstyle": "-", "color": "0.6", "linewidth": 0.5, "shrinkA": 0},
         )
 
 
