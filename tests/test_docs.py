@@ -1,5 +1,6 @@
 """The documentation: its code runs, its links lead somewhere, its tables are those of the code."""
 
+import itertools
 import json
 import re
 import typing
@@ -10,6 +11,7 @@ import pytest
 import typer
 
 import quietbus as qb
+from oracles.pages import assert_shown, table
 from quietbus import cli
 from quietbus.analysis.windows import METRICS
 from quietbus.results import CONTROL_VARIABLES, JOINT_VARIABLES, ROTOR_VARIABLES, VARIABLES, Summary
@@ -36,27 +38,12 @@ def _name(page: Path) -> str:
 def _code_blocks():
     for page in PAGES:
         text = page.read_text(encoding="utf-8")
-        for match in FENCE.finditer(text):
+        blocks = list(FENCE.finditer(text))
+        for match, after in itertools.pairwise([*blocks, None]):
             if match[1] == "python":
                 line = text[: match.start()].count("\n") + 2
-                yield pytest.param(page, line, match[2], id=f"{_name(page)}:{line}")
-
-
-def _rows(text: str, heading: tuple[str, ...]) -> list[list[str]]:
-    """Rows of all tables in a page that have the given heading."""
-    rows, inside = [], False
-    for line in text.splitlines():
-        if not line.startswith("|"):
-            inside = False
-            continue
-        cells = [cell.strip() for cell in line.strip().strip("|").split("|")]
-        if tuple(cells) == heading:
-            inside = True
-        elif inside and set(line) - set("|- "):
-            assert len(cells) == len(heading), line
-            rows.append(cells)
-    assert rows, f"no table {heading}"
-    return rows
+                shown = after[2] if after and after[1] == "text" else ""
+                yield pytest.param(page, line, match[2], shown, id=f"{_name(page)}:{line}")
 
 
 def _unquoted(cell: str) -> str:
@@ -64,12 +51,17 @@ def _unquoted(cell: str) -> str:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("page", "line", "code"), list(_code_blocks()))
-def test_python_in_the_documentation_runs(page, line, code, tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize(("page", "line", "code", "shown"), list(_code_blocks()))
+def test_python_in_the_documentation_gives_what_is_shown(
+    page, line, code, shown, tmp_path, monkeypatch, capsys
+):
+    """A block ``text`` after the code is its output, or some lines of it."""
     monkeypatch.chdir(tmp_path)
     # blank lines before the code, so that a failure points into the page
     exec(compile("\n" * (line - 1) + code, str(page), "exec"), {"__name__": "__docs__"})
-    assert capsys.readouterr().out
+    output = capsys.readouterr().out
+    assert output
+    assert_shown(shown, output)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=_name)
@@ -114,7 +106,7 @@ def test_results_page_has_every_variable_with_dimensions_and_unit():
     heading = ("variable", "dimensions after `time`", "unit", "meaning", "frame")
     documented = {
         _unquoted(name): (tuple(dimensions.split(", ")) if dimensions else (), unit)
-        for name, dimensions, unit, _, _ in _rows(_text("docs/results.md"), heading)
+        for name, dimensions, unit, _, _ in table(_text("docs/results.md"), heading)
     }
     variables = VARIABLES | CONTROL_VARIABLES | ROTOR_VARIABLES | JOINT_VARIABLES
     described = {name: (dims, unit) for name, (dims, unit, _) in variables.items()}
@@ -125,9 +117,9 @@ def test_results_page_has_every_variable_with_dimensions_and_unit():
 def test_results_page_has_every_dimension_and_attribute_of_a_run():
     page = _text("docs/results.md")
     run = qb.simulate("zhang2012", duration=0.01)
-    attributes = {_unquoted(name) for name, _ in _rows(page, ("attribute", "meaning"))}
+    attributes = {_unquoted(name) for name, _ in table(page, ("attribute", "meaning"))}
     assert attributes == set(run.attrs)
-    dimensions = {_unquoted(row[0]) for row in _rows(page, ("dimension", "length", "labels"))}
+    dimensions = {_unquoted(row[0]) for row in table(page, ("dimension", "length", "labels"))}
     assert dimensions == set(run.sizes)
     for variable in run.data_vars.values():
         assert variable.attrs.keys() == {"units", "long_name"}
@@ -140,7 +132,7 @@ def test_results_page_has_every_number_of_a_summary():
 
 
 def test_readme_lists_the_commands():
-    rows = _rows(_text("README.md"), ("command", "does"))
+    rows = table(_text("README.md"), ("command", "does"))
     documented = {re.search(r"quietbus (\w+)", row[0])[1] for row in rows if "quietbus" in row[0]}
     assert documented == set(typer.main.get_command(cli.app).commands)
 
@@ -150,7 +142,7 @@ def test_readme_names_the_built_in_scenarios_and_the_settings():
     for name in builtin_names():
         assert f"`{name}`" in readme
     settings = _text("src/quietbus/jaxconfig.py")
-    for name, _, _ in _rows(readme, ("setting", "value", "why")):
+    for name, _, _ in table(readme, ("setting", "value", "why")):
         assert _unquoted(name) in settings
     for name in re.findall(r'os\.environ(?:\.\w+\(|\[)"(\w+)"', settings):
         assert f"`{name}`" in readme
@@ -158,7 +150,7 @@ def test_readme_names_the_built_in_scenarios_and_the_settings():
 
 def test_scenario_page_has_every_key_with_unit_and_default():
     page = _text("docs/scenario.md")
-    rows = _rows(page, ("key", "unit", "default", "meaning"))
+    rows = table(page, ("key", "unit", "default", "meaning"))
     documented = {_unquoted(key): (unit, default) for key, unit, default, _ in rows}
     assert len(documented) == len(rows), "a key is documented twice"
     keys: dict = {}
@@ -190,7 +182,7 @@ def test_glossary_names_what_exists():
     }
     known |= {f"NAME_jitter_{kind}" for kind in ("amplitude", "phase", "envelope")}
     known |= {f"NAME_jitter_{kind}" for kind in ("worst_case", "rss", "rms")}
-    rows = _rows(_text("docs/glossary.md"), ("word", "meaning", "in quietbus"))
+    rows = table(_text("docs/glossary.md"), ("word", "meaning", "in quietbus"))
     assert len({word for word, _, _ in rows}) == len(rows)
     for word, _, where in rows:
         for name in re.findall(r"`([^`]+)`", where):

@@ -1,9 +1,15 @@
 """The whole linear analysis of a scenario: the paper's numbers, odd scenarios, and invariance."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import quietbus as qb
+from oracles.pages import assert_rounds, table
+from quietbus.analysis.loop import attitude_loop, stable_gain_range
+from quietbus.dynamics.linearize import platform_inertia
 from quietbus.study import at_height, without_leg_mass
 
 LEGS = ("upper_joints", "lower_joints", "universal_axes")
@@ -70,6 +76,95 @@ def test_legs_without_mass_keep_their_struts(paper):
     light = without_leg_mass(paper.satellite).legs
     assert float(light.upper.mass.sum() + light.lower.axial_inertia.sum()) == 0.0
     np.testing.assert_array_equal(light.stiffness, paper.satellite.legs.stiffness)
+
+
+# --- the numbers of docs/analysis.md ------------------------------------------------------------
+
+PAGE = (Path(__file__).parents[1] / "docs" / "analysis.md").read_text(encoding="utf-8")
+
+
+def test_page_has_the_limits_one_simplification_lifted_at_a_time(paper):
+    shown = table(PAGE, ("what", "stable K", "margin against more gain"))
+    for (what, limits, margin), row in zip(shown, paper.truth, strict=True):
+        (ends,) = row["stable_gain_range"]
+        assert_rounds(limits.replace(" to ", " , "), *ends)
+        assert_rounds(margin, 20.0 * np.log10(ends[1] / 2500.0))
+        assert what.startswith("per axis") == row["case"].startswith("per axis")
+
+
+def test_page_has_the_limits_by_height(paper):
+    heights, limits = (
+        [cell.strip() for cell in row.strip("| ").split("|")][1:]
+        for row in PAGE.splitlines()
+        if row.startswith(("| height, m", "| upper limit of K |"))
+    )
+    heights = np.array([float(height.replace("−", "-")) for height in heights])
+    # the plate's place in the built-in satellite is 0.6 m + sqrt(2)/4 m
+    heights = np.where(np.isin(heights, (0.354, 0.954)), heights + 0.25 * 2**0.5 - 0.354, heights)
+    for limit, (_, high) in zip(limits, paper.limits_by_height(heights), strict=True):
+        assert_rounds(limit, high)
+
+
+@pytest.mark.slow
+def test_page_has_limits_and_jitter_by_stiffness_and_damping():
+    for legs, limit, jitter in table(PAGE, ("legs", "upper limit of K", "jitter that passes")):
+        stiffness, damping = re.search(r"(\d+) kN/m, (\d+) N s/m", legs).groups()
+        study = qb.analyze(
+            changed(
+                {
+                    "isolator.legs.stiffness": 1e3 * float(stiffness),
+                    "isolator.legs.damping": float(damping),
+                }
+            )
+        )
+        assert_rounds(limit, study.coupled.stable_gain_range[-1][1])
+        passes = study.transmissibility(np.array([100.0])).rate_ratio[0, 1]
+        assert_rounds(jitter, 100.0 * passes)
+
+
+def test_page_says_what_the_lever_does(paper):
+    """Its formula for G_H with polynomials of NumPy, about y."""
+    mass, _, inertia = platform_inertia(paper.satellite, np.zeros(4))
+    legs = paper.scenario.isolator.legs
+    u = np.array([np.ravel(legs.damping)[0], np.ravel(legs.stiffness)[0]])
+    a, b, d = 2.0, 0.25 * np.sqrt(2.0), 0.25
+    delta = a * d - b**2
+    assert delta == pytest.approx(3.0 / 8.0)
+    base = paper.scenario.isolator.separation
+
+    def channel(height):
+        end = delta * np.polymul(u, u)
+        top = np.polymul(u, np.polyadd([(d - b * height) * mass, 0.0, 0.0], delta * u))
+        middle = np.polymul(u, [mass * d + inertia[1, 1] * a, 0.0, 0.0])
+        bottom = np.polyadd(np.polyadd([mass * inertia[1, 1], 0, 0, 0, 0], middle), end)
+        return top, bottom
+
+    def limit(height, bus):
+        (ends,) = stable_gain_range(attitude_loop(*channel(height), bus, paper.pid))
+        return ends[1]
+
+    def zeros(height):  # those that u does not bring
+        return np.roots(np.polyadd([(d - b * height) * mass, 0.0, 0.0], delta * u))
+
+    assert d - b * base == pytest.approx(0.125)
+    assert limit(base, 900.0) == pytest.approx(paper.loop_analyses["y"].stable_gain_range[0][1])
+    bus = float(paper.satellite.bus.mass)
+    lever = bus * mass / (bus + mass) * (base + 0.6) ** 2  # about the common mass centre
+    modes = np.sort(np.unique(np.abs(np.roots(channel(base)[1])).round(6))) / (2.0 * np.pi)
+    for said, here in (
+        (r"modes \((.*?) and (.*?) Hz\)", modes),
+        (r"have reached ([\d.]+) Hz", [np.abs(zeros(base)[0]) / (2.0 * np.pi)]),
+        (r"H = d/b = ([\d.]+) m", [d / b]),
+        (r"right half-plane, at (\d+) rad/s", [zeros(base + 0.6).real.max()]),
+        (r"about y from 7463 to (\d+)", [limit(base + 0.6, 900.0)]),
+        (r"mass centre \(900 \+ (\d+) kg m²\) to", [lever]),
+        (r"kg m²\) to (\d+)\.", [limit(base + 0.6, 900.0 + lever)]),
+        (r"1000 against ([\d.]+) kg", [mass]),
+    ):
+        numbers = re.search(said, " ".join(PAGE.split()))
+        assert numbers, said
+        for shown, value in zip(numbers.groups(), here, strict=True):
+            assert_rounds(shown, value)
 
 
 # --- odd scenarios -----------------------------------------------------------------------------

@@ -22,12 +22,12 @@ from pathlib import Path
 import pytest
 import typer
 
+from oracles.pages import assert_shown
 from quietbus import cli
 
 FOLDER = Path(__file__).parents[1] / "docs" / "tutorials"
 PAGES = sorted(FOLDER.glob("*.md"))
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
-NUMBER = r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
 
 
 class Reader:
@@ -79,34 +79,6 @@ class Reader:
         content = file.read_text(encoding="utf-8")
         assert content.count(old) == 1, f"{file} has not once\n{old}"
         file.write_text(content.replace(old, new), encoding="utf-8")
-
-
-def assert_shown(shown, output):
-    """Every line of ``shown`` comes in ``output``, in order."""
-    left = iter(output.splitlines())
-    for line in filter(None, (" ".join(line.split()) for line in shown.splitlines())):
-        assert any(_same(line, " ".join(real.split())) for real in left), (
-            f"not in the output, or not in this place: {line}\n{output}"
-        )
-
-
-def _same(shown, real):
-    parts = re.split(rf"(\.\.\.|{NUMBER})", shown)
-    pattern = "".join(
-        (".*?" if part == "..." else f"({NUMBER})") if i % 2 else re.escape(part)
-        for i, part in enumerate(parts)
-    )
-    found = re.fullmatch(pattern, real)
-    numbers = [part for part in parts[1::2] if part != "..."]
-    return bool(found) and all(map(_close, numbers, found.groups()))
-
-
-def _close(shown, real):
-    """Equal, but for one in the last digit of a number that is not whole."""
-    mantissa, _, exponent = shown.partition("e")
-    decimals = len(mantissa.partition(".")[2])
-    unit = 10.0 ** (int(exponent or 0) - decimals) if decimals or exponent else 0.0
-    return abs(float(shown) - float(real)) <= 1.001 * unit
 
 
 @pytest.mark.slow
