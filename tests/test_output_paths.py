@@ -87,6 +87,18 @@ def test_folder_of_results_is_checked_for_what_is_no_older_result(
     assert (tmp_path / "out" / file).read_text() == "mine"
 
 
+def test_slowness_without_compilation_is_told(capsys):
+    import jax
+
+    from quietbus.cli.session import import_heavy
+
+    import_heavy()
+    assert "JAX_DISABLE_JIT" not in capsys.readouterr().err
+    with jax.disable_jit():
+        import_heavy()
+    assert "note: JAX_DISABLE_JIT is set, so nothing is compiled" in capsys.readouterr().err
+
+
 def test_bad_output_is_told_before_anything_heavy_is_loaded(tmp_path):
     import subprocess
 

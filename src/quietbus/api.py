@@ -31,6 +31,7 @@ from quietbus.results import (
     to_dataset,
 )
 from quietbus.results.checkpoint import Checkpoint
+from quietbus.results.size import check_space
 from quietbus.results.task import Task
 from quietbus.scenario import LineOfSight, Problem, Scenario, ScenarioError, load_scenario
 from quietbus.scenario.plausibility import implausible
@@ -112,7 +113,7 @@ def simulate(
         TypeError, ValueError: an argument of the wrong kind or value, by its name.
         CheckpointError: (a ValueError) to resume, a checkpoint that cannot be read or is of
             another run; to begin, one that holds a part of this very run.
-        OutputError: (an OSError) the checkpoint cannot be begun.
+        OutputError: (an OSError) the checkpoint cannot be begun, or its disk has no room.
         ResonanceError: an order of a rotor lies on an undamped mode (harmonic).
         SimulationError: the run diverged, or its output rate could not show the gimbal motors'
             ripple; what was computed until then is in its ``run``.
@@ -470,6 +471,7 @@ def _kept(
         if resume:
             raise ValueError("resume needs a checkpoint")
         return solve(task, progress, _Keeping(None, None))
+    check_space(checkpoint, task)
     if resume and pathlib.Path(checkpoint).exists():
         file, start = Checkpoint.resume(checkpoint, task)
     else:

@@ -12,6 +12,7 @@ import pytest
 import quietbus as qb
 from quietbus.results import checkpoint as checkpoints
 from quietbus.results.checkpoint import CheckpointError, read
+from quietbus.results.size import expected_size
 from quietbus.results.task import Task, differences
 from quietbus.writing import OutputError
 
@@ -142,6 +143,23 @@ def test_nothing_is_left_of_a_run_that_could_not_begin(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_size_is_known_before(whole):
+    task = Task(qb.scenario_of(whole), "direct")
+    assert expected_size(task) == pytest.approx(whole.nbytes, rel=0.01)
+
+
+def test_disk_without_room_is_told_before_the_flight(tmp_path, monkeypatch):
+    usage = shutil.disk_usage(tmp_path)
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=1_000_000))
+    path, reached = tmp_path / "run.nc.checkpoint", []
+    with pytest.raises(
+        OutputError, match=r"too little room: .* need about 3\.\d+ MB, 1 MB are free"
+    ):
+        qb.simulate("zhang2012", duration=LENGTH, checkpoint=path, progress=reached.append)
+    assert not reached
+    assert not list(tmp_path.iterdir())
+
+
 def test_task_comes_back_as_it_was():
     lines = {"camera": np.arange(36.0).reshape(3, 12) / 7.0}
     task = Task(
@@ -156,6 +174,9 @@ def test_harmonic_run_goes_on_from_its_slow_motion(every_piece, tmp_path):
     asked = {"method": "harmonic", "duration": 60.0, "output_rate": 2.0}
     path = tmp_path / "run.nc.checkpoint"
     whole = qb.simulate("zhang2012", **asked)
+    assert expected_size(Task(qb.scenario_of(whole), "harmonic")) == pytest.approx(
+        whole.nbytes, rel=0.02
+    )
     with pytest.warns(qb.QuietbusWarning, match="interrupted"):
         qb.simulate("zhang2012", **asked, progress=stopping_at(20.0), checkpoint=path)
     partial = qb.load_run(path)  # the slow motion of 50 s is there, its jitter computed on reading

@@ -53,8 +53,15 @@ def import_heavy() -> None:
         with status() as tell:
             tell("loading JAX")
             import quietbus.api
+    import jax
+
     import quietbus.api
 
+    if jax.config.jax_disable_jit:  # type: ignore[attr-defined]
+        print(
+            "note: JAX_DISABLE_JIT is set, so nothing is compiled: a flight of 10 ms takes minutes",
+            file=sys.stderr,
+        )
     # what is odd in a scenario has been told when it was read
     warnings.simplefilter("ignore", quietbus.api.ImplausibleValue)
 
