@@ -199,25 +199,40 @@ def compare(
 
 @app.command()
 def plot(
-    run: Annotated[Path, typer.Argument(metavar="RUN.nc", help="A run of `quietbus simulate`.")],
+    what: Annotated[
+        str,
+        typer.Argument(
+            metavar="RUN.nc|SCENARIO", help="A run, or a scenario (a .yaml file or a built-in)."
+        ),
+    ],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder; default RUN's name.")
+        Path | None, typer.Option("-o", "--output", help="Folder; default the run's name, or out.")
     ] = None,
     suffix: Annotated[str, typer.Option("--format", help="png, svg or pdf.")] = "png",
 ) -> None:
-    """Draw the pictures of a run."""
+    """Draw the pictures of a run, or the satellite that a scenario describes."""
     if suffix not in ("png", "svg", "pdf"):
         raise BadInput(f"--format: expected png, svg or pdf, got '{suffix}'")
-    from quietbus.plots import run_figures, save_figures
-    from quietbus.results import load_run
+    from quietbus.plots import geometry_figures, save_figures
+    from quietbus.scenario import builtin_names
 
-    try:
-        loaded = load_run(run)
-    except (FileNotFoundError, ValueError) as error:
-        raise BadInput(str(error)) from None
-    folder = output or run.with_suffix("")
-    make_folder(folder)
-    for path in save_figures(run_figures(loaded), folder, f".{suffix}"):
+    if what in builtin_names() or Path(what).suffix in (".yaml", ".yml"):
+        scenario = load(what, None, None)
+        folder = output or OUT
+        make_folder(folder)
+        figures = geometry_figures(scenario)
+    else:
+        from quietbus.plots import run_figures
+        from quietbus.results import load_run
+
+        try:
+            loaded = load_run(what)
+        except (FileNotFoundError, ValueError) as error:
+            raise BadInput(str(error)) from None
+        folder = output or Path(what).with_suffix("")
+        make_folder(folder)
+        figures = run_figures(loaded)
+    for path in save_figures(figures, folder, f".{suffix}"):
         print(f"wrote {path}")
 
 

@@ -1,21 +1,8 @@
-"""Pictures of runs, good enough for a paper; they show what the results hold."""
+"""Pictures of runs, studies and scenarios, good enough for a paper; they show what is there.
 
-from quietbus.plots.analysis import analysis_figures
-from quietbus.plots.compare import compare_figures, envelope_comparison
-from quietbus.plots.jitter import jitter_figures
-from quietbus.plots.pointing import pointing_figures
-from quietbus.plots.run import run_figures
-from quietbus.plots.style import save_figures
-from quietbus.plots.sweep import run_up_figure, sweep_figures
+Loaded when first used: what draws a scenario needs no JAX.
+"""
 
-__all__ = [
-    "analysis_figures",
-    "compare_figures",
-    "envelope_comparison",
-    "jitter_figures",
-    "pointing_figures",
-    "run_figures",
-    "run_up_figure",
-    "save_figures",
-    "sweep_figures",
-]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

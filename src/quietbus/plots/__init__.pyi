@@ -1,0 +1,10 @@
+from .analysis import analysis_figures as analysis_figures
+from .compare import compare_figures as compare_figures
+from .compare import envelope_comparison as envelope_comparison
+from .geometry import geometry_figures as geometry_figures
+from .jitter import jitter_figures as jitter_figures
+from .pointing import pointing_figures as pointing_figures
+from .run import run_figures as run_figures
+from .style import save_figures as save_figures
+from .sweep import run_up_figure as run_up_figure
+from .sweep import sweep_figures as sweep_figures

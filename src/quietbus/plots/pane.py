@@ -1,0 +1,154 @@
+"""A drawing of things in space, along an axis or in perspective: the same calls for both."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+LETTERS = "xyz"
+_BOX = {"boxstyle": "round,pad=0.1", "facecolor": "w", "edgecolor": "none", "alpha": 0.7}
+
+
+class Pane:
+    """Axes on which points of space are drawn."""
+
+    def __init__(self, axes: Any, plane: tuple[int, int] | None, size: float) -> None:
+        self.axes = axes
+        self.size = size  # [m] of what is drawn
+        self.plane = plane  # indices of the axes to the right and up; None: perspective
+        self.labels: list[tuple[np.ndarray, str, Any]] = []
+        if plane is not None:
+            right, up = plane
+            axes.set_aspect("equal")
+            axes.set(xlabel=f"{LETTERS[right]} [m]", ylabel=f"{LETTERS[up]} [m]")
+        else:
+            axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
+            axes.tick_params(labelsize=7, pad=-2)
+            axes.view_init(elev=22, azim=-68)
+            axes.set_proj_type("persp", focal_length=0.6)
+            axes.locator_params(nbins=5)
+
+    def seen(self, points: Any) -> np.ndarray:
+        """(..., 2 or 3) coordinates on this pane."""
+        points = np.asarray(points, dtype=float)
+        return points if self.plane is None else points[..., list(self.plane)]
+
+    def line(self, points: Any, **look: Any) -> None:
+        """A line through points (n, 3)."""
+        self.axes.plot(*self.seen(points).T, **look)
+
+    def fill(self, points: Any, colour: str, label: str | None = None, alpha: float = 0.2) -> None:
+        """A flat polygon."""
+        corners = self.seen(points)
+        if self.plane is None:
+            from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+            self.axes.add_collection3d(
+                Poly3DCollection([corners], facecolor=colour, edgecolor=colour, alpha=alpha)
+            )
+        else:
+            self.axes.fill(*corners.T, facecolor=colour, alpha=alpha, linewidth=0)
+        self.line([*points, points[0]], color=colour, linewidth=1.0, label=label)
+
+    def arrow(self, start: Any, along: Any, colour: str, width: float = 1.6) -> None:
+        """An arrow; none where it points at the viewer."""
+        a, b = self.seen(start), self.seen(np.asarray(start) + np.asarray(along))
+        whole = float(np.linalg.norm(along))
+        if np.linalg.norm(b - a) < 0.02 * max(whole, 1e-12):
+            return
+        if self.plane is None:
+            head = min(0.3, 0.06 * self.size / whole)
+            self.axes.quiver(*a, *(b - a), color=colour, linewidth=width, arrow_length_ratio=head)
+            return
+        self.axes.annotate(
+            "",
+            b,
+            a,
+            arrowprops={
+                "arrowstyle": "-|>",
+                "color": colour,
+                "linewidth": width,
+                "mutation_scale": 9,
+                "shrinkA": 0,
+                "shrinkB": 0,
+            },
+        )
+        self.axes.plot(*np.stack([a, b]).T, alpha=0.0)  # the limits hold the arrow too
+
+    def label(self, at: Any, text: str, **look: Any) -> None:
+        """A word beside a point, or beside one of several (n, 3), drawn by ``finish``."""
+        self.labels.append((np.atleast_2d(np.asarray(at, dtype=float)), text, look))
+
+    def finish(self, centre: Any) -> None:
+        """Draw the words, away from the centre; those at one place as one, others apart."""
+        middle, apart = self.seen(centre), 0.09 * self.size
+        groups: list[tuple[np.ndarray, list[str], Any]] = []
+        for at, text, look in self.labels:
+            places = self.seen(at)
+            for taken, words, its in groups:
+                same = its == look and np.linalg.norm(taken - places[0]) < 0.5 * apart
+                if same and text not in words:
+                    words.append(text)
+                if same:
+                    break
+            else:
+                groups.append((self._free(places, [taken for taken, *_ in groups]), [text], look))
+        for place, words, look in groups:
+            self._write(place, middle, _joined(words), 0.4 * apart, look)
+
+    def _free(self, places: np.ndarray, taken: list[np.ndarray]) -> np.ndarray:
+        """The first place with room around it, or the one with the most."""
+        room = [
+            min((float(np.linalg.norm(place - other)) for other in taken), default=np.inf)
+            for place in places
+        ]
+        enough = [i for i, least in enumerate(room) if least > 0.16 * self.size]
+        free: np.ndarray = places[enough[0] if enough else int(np.argmax(room))]
+        return free
+
+    def _write(
+        self, place: np.ndarray, middle: np.ndarray, text: str, shift: float, look: Any
+    ) -> None:
+        away = place - middle
+        long = float(np.linalg.norm(away))
+        if self.plane is None:
+            moved = place + shift * away / max(long, 1e-12)
+            self.axes.text(*moved, text, ha="center", va="center", bbox=_BOX, **look)
+            return
+        self.axes.annotate(
+            text,
+            place,
+            xytext=tuple(np.where(np.abs(away) > 0.3 * long, np.sign(away), 0.0) * 6.0),
+            textcoords="offset points",
+            ha=_side(away[0], long, ("right", "left")),
+            va=_side(away[1], long, ("top", "bottom")),
+            bbox=_BOX,
+            **look,
+        )
+
+    def bound(self, points: Any, margin: float) -> None:
+        """Show these points, and all directions to one scale."""
+        points = np.asarray(points, dtype=float)
+        low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
+        if self.plane is not None:
+            right, up = self.plane
+            self.axes.set_xlim(low[right], high[right])
+            self.axes.set_ylim(low[up], high[up])
+            return
+        self.axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+        self.axes.set_box_aspect(high - low, zoom=0.88)
+
+
+def _side(component: float, long: float, names: tuple[str, str]) -> str:
+    if abs(component) <= 0.3 * long:
+        return "center"
+    return names[0] if component < 0 else names[1]
+
+
+def _joined(words: list[str]) -> str:
+    """``leg 0``, ``leg 3`` as ``leg 0, 3``."""
+    heads = {word.rpartition(" ")[0] for word in words}
+    if len(words) > 1 and len(heads) == 1 and (head := heads.pop()):
+        return f"{head} {', '.join(word.rpartition(' ')[2] for word in words)}"
+    return ", ".join(words)
