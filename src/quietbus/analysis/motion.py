@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
 from scipy.interpolate import make_interp_spline
 
 from quietbus.analysis.noise import Noise
@@ -13,6 +14,7 @@ SAME_FREQUENCY = 1e-9  # relative: lines closer than this are one
 MOST_NODES = 4_000_000  # values of a signal looked at in all windows together
 NODES = 2  # Gauss points in each interval between samples
 FEWEST_NODES = 12  # in a window
+MOST_ORDERS = 40  # of a signal in a window that are kept
 
 
 @dataclass(frozen=True)
@@ -23,6 +25,7 @@ class WindowParts:
     smear: np.ndarray  # (window, c)
     about_mean: np.ndarray  # (window, c, c) mean product of deviations from the mean
     about_line: np.ndarray  # (window, c, c) mean product of deviations from mean and slope
+    coefficients: np.ndarray  # (window, order, c) of Legendre polynomials of mean square one
 
 
 @dataclass(frozen=True)
@@ -56,12 +59,19 @@ class SampledSignal:
         return np.asarray(self._spline(t))
 
     def windows(self, centers: np.ndarray, length: float) -> WindowParts:
-        """Windows of ``length`` [s] about ``centers`` (window,) [s], by Gauss's quadrature."""
+        """Windows of ``length`` [s] about ``centers`` (window,) [s], by Gauss's quadrature.
+
+        Coefficients from order 1, the smear, as far as the samples in a window tell them.
+        """
         panels = max(FEWEST_NODES // NODES, int(np.ceil(length * self.rate)))
         nodes, weights = np.polynomial.legendre.leggauss(NODES)
         edges = np.linspace(-0.5, 0.5, panels + 1)
         x = (0.5 * (edges[1:] + edges[:-1])[:, None] + 0.5 * nodes / panels).ravel()
         w = np.tile(0.5 * weights / panels, panels)
+        powers = legvander(2.0 * x, min(panels, MOST_ORDERS)) * np.sqrt(w)[:, None]
+        # orthonormal in these nodes, so that no coefficient has anything of another's
+        own, sign = np.linalg.qr(powers)
+        legendre = ((own * np.sign(np.diag(sign))).T * np.sqrt(w))[1:]
         parts = []
         step = max(1, MOST_NODES // (8 * len(x)))
         for start in range(0, len(centers), step):
@@ -70,7 +80,9 @@ class SampledSignal:
             smear = 12.0 * np.einsum("q,kqc->kc", w * x, y)
             y = y - mean[:, None]
             straight = y - smear[:, None] * x[:, None]
-            parts.append((mean, smear, *(_product(w, each) for each in (y, straight))))
+            coefficients = legendre @ y
+            products = (_product(w, each) for each in (y, straight))
+            parts.append((mean, smear, *products, coefficients))
         return WindowParts(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
     def how_many(self, length: float, most: int) -> int:

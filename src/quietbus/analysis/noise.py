@@ -11,12 +11,13 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import ndtr
 
+from quietbus.analysis.chi_square import UnsoundStatisticError, bounds
 from quietbus.analysis.windows import Metric, table_weights
 
 ANGLES = 2**15  # of directions, over all deviations together
 NARROW = 1e-4  # of the larger variance: the smaller counts as this in a rate of crossing
 CIRCLE = 4096
-SIGMAS = 40.0  # no quantile is further out
+SAMPLED = 0.02  # of the logarithm of a probability, by which few directions may err
 
 
 @dataclass(frozen=True)
@@ -38,9 +39,16 @@ class Noise:
 
     def at(self, t: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Values (n, ...) at times [s] from those at the looks (look, ...); constant outside."""
+        return np.tensordot(self._shares(t), values, axes=1)
+
+    def mean_at(self, t: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """The mean of ``at`` over the times."""
+        return np.tensordot(self._shares(t).mean(axis=0), values, axes=1)
+
+    def _shares(self, t: np.ndarray) -> np.ndarray:
+        """(n, look)"""
         own = np.eye(len(self.time))
-        share = np.stack([np.interp(t, self.time, column) for column in own], axis=-1)
-        return np.tensordot(share, values, axes=1)
+        return np.stack([np.interp(t, self.time, column) for column in own], axis=-1)
 
     def products(self, weights: np.ndarray) -> np.ndarray:
         """Mean products (look, part, c, c) under weights (f,) of the table."""
@@ -96,15 +104,44 @@ def beyond(radius: float, deviation: np.ndarray, spread: np.ndarray, m: int = 1)
         return np.where(rest <= 0.0, leaves, outside)
 
 
-def quantile(confidence: float, deviation: np.ndarray, spread: np.ndarray) -> float:
-    """Radius within which all deviations (n, c), each with its noise, together stay so often."""
-    m = int(np.clip(ANGLES // len(deviation), 2, CIRCLE))
-    sigma = float(np.sqrt(np.max(np.sum(spread**2, axis=(1, 2)))))
-    end = float(np.max(np.linalg.norm(deviation, axis=1))) + SIGMAS * sigma
-    if end == 0.0:
+def quantile(
+    confidence: float, deviation: np.ndarray, spread: np.ndarray, angles: int = ANGLES
+) -> float:
+    """Radius within which all deviations (n, c), each with its noise, together stay so often.
+
+    Args:
+        angles: directions of the noise that are looked at, of all deviations together.
+
+    Raises:
+        UnsoundStatisticError: outside what mean and variance of the square allow.
+    """
+    m = int(np.clip(angles // len(deviation), 2, CIRCLE))
+    low, high = bounds(confidence, *square_moments(deviation, spread))
+    start, end = np.sqrt(max(low, 0.0)) * (1.0 - 1e-6), np.sqrt(max(high, 0.0)) * (1.0 + 1e-6)
+    if end <= 0.0:
         return 0.0
-    off = lambda r: float(np.mean(beyond(r * end, deviation, spread, m))) - (1.0 - confidence)  # noqa: E731
-    return end * float(brentq(off, 0.0, 1.0, xtol=1e-8))
+
+    def off(r: float) -> float:
+        out = float(np.mean(beyond(r * end, deviation, spread, m)))
+        return float(np.log(max(out, 1e-300) / (1.0 - confidence)))
+
+    if off(start / end) < -SAMPLED or off(1.0) > SAMPLED:
+        raise UnsoundStatisticError(
+            f"a deviation at {confidence:g} lies outside {start:g} to {end:g}, which mean and "
+            "variance of its square allow"
+        )
+    if off(start / end) <= 0.0:
+        return float(start)
+    return end * float(brentq(off, start / end, 1.0, xtol=1e-7)) if off(1.0) < 0.0 else float(end)
+
+
+def square_moments(deviation: np.ndarray, spread: np.ndarray) -> tuple[float, float]:
+    """Mean and variance of the squared length of deviations (n, c) with their noise, together."""
+    covariance = spread @ spread.swapaxes(1, 2)
+    mean = np.sum(deviation**2, axis=1) + np.trace(covariance, axis1=1, axis2=2)
+    own = 2.0 * np.sum(covariance**2, axis=(1, 2))
+    crossed = 4.0 * np.einsum("na,nab,nb->n", deviation, covariance, deviation)
+    return float(np.mean(mean)), float(np.mean(own + crossed) + np.var(mean))
 
 
 def largest(

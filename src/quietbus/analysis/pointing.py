@@ -18,11 +18,15 @@ from typing import Literal
 
 import numpy as np
 from scipy.optimize import brentq, minimize
+from scipy.special import ndtri
 from scipy.stats import norm
 
+from quietbus.analysis.chi_square import MeanSquare, joined, quantile
 from quietbus.analysis.image_quality import mtf_loss
-from quietbus.analysis.judged_noise import DeviationNoise, JitterNoise, Luck
+from quietbus.analysis.judged_noise import DeviationNoise
 from quietbus.analysis.motion import ImageMotion, SampledSignal, WindowParts
+from quietbus.analysis.noise import ANGLES
+from quietbus.analysis.window_noise import Fortune, WindowNoise, of_lines
 from quietbus.analysis.windows import DRIFTS, LINEAR, Metric, gain, left_over, weight
 
 Interpretation = Literal["ensemble", "temporal", "mixed"]
@@ -36,6 +40,10 @@ MEMBERS = 2000  # at least (ensemble)
 MOST_MEMBERS = 20_000  # (ensemble); rarer ones are bounded by the worst member
 TAIL = 20  # members or more beyond the level (ensemble)
 TRIED = 2048  # windows in which the worst member is sought (temporal)
+TRIED_IN_NOISE = 512  # the same where noise makes the distribution smooth
+FEWER_ANGLES = 2**12  # of noise, in that search
+SMOOTH_DRAWS = 2**15  # in place of DRAWS, the same way
+SIDES = 8  # directions in which the largest MTF_loss with noise is sought
 STARTS, SWEEPS = 3, 4  # of that search
 TURN = 2.0 * np.pi
 DIRECTIONS = 120  # around the circle
@@ -146,12 +154,13 @@ class _Judge:
             self.same, self.other = (left_over(u[:, None], side, 2) for side in (u, -u))
         self.slow = _slow(signal, metric, self.centers, self.at)
         self.deviating: DeviationNoise | None = None
-        self.jittering: JitterNoise | None = None
+        self.within: WindowNoise | None = None
+        self.duration = max(0.0, end - start - metric.span)
         if self.noise is not None and metric.name in LINEAR:
             self.deviating = DeviationNoise(self.noise, metric, self.centers, self.at, stretch)
-        elif self.noise is not None and metric.name != "rms":
-            self.jittering = JitterNoise(
-                self.noise, metric, self.centers, self.f, stretch, self.rng
+        elif self.noise is not None and isinstance(self.slow, WindowParts):
+            self.within = WindowNoise(
+                self.noise, metric.window, self.centers, self.f, self.slow.coefficients
             )
         self.band = (
             signal.mean_square_above(metric.above, start, end) if metric.name == "rms" else None
@@ -190,13 +199,26 @@ class _Judge:
         shift = np.exp(1j * self.lines.order * turns[:, self.lines.rotor])
         return self.lines.together(self.base[which] * shift[..., None])
 
+    @cached_property
+    def fortune(self) -> Fortune:
+        """Of noise in the windows, the same for all members."""
+        assert self.within is not None
+        return self.within.fortune(self.rng, len(self.centers))
+
     def quantile(
-        self, confidence: float, turns: np.ndarray, which: np.ndarray | slice = slice(None)
+        self,
+        confidence: float,
+        turns: np.ndarray,
+        which: np.ndarray | slice = slice(None),
+        angles: int = ANGLES,
     ) -> float:
         """Of the metric in windows ``which`` for members (n or 1, rotor), all together."""
         if self.deviating is not None:
-            return self.deviating.quantile(confidence, self.deviations(turns, which), which)
-        return float(np.quantile(self.values(turns, which), confidence))
+            return self.deviating.quantile(confidence, self.deviations(turns, which), which, angles)
+        if self.within is not None and self.metric.name == "jitter":
+            whole, rest, known = self.mean_squares(turns, which, angles)
+            return float(np.sqrt(quantile(confidence, whole, rest, known)))
+        return float(np.quantile(self.values(turns, which, fresh=len(turns) > 1), confidence))
 
     def deviations(self, turns: np.ndarray, which: np.ndarray | slice) -> np.ndarray:
         """A linear metric (n, c) as a vector, without its noise."""
@@ -211,48 +233,81 @@ class _Judge:
             moved = moved + np.sum(g * z, axis=1).real
         return moved
 
+    def mean_squares(
+        self, turns: np.ndarray, which: np.ndarray | slice, draws: int
+    ) -> tuple[MeanSquare, MeanSquare, np.ndarray]:
+        """The jitter's mean square with noise in it, as ``quantile`` takes it."""
+        assert self.within is not None
+        if isinstance(which, np.ndarray) and len(which) > AT_ONCE:
+            share = draws * AT_ONCE // len(which)
+            each = [self.mean_squares(*part, share) for part in _parts(turns, which)]
+            wholes, rests, known = zip(*each, strict=True)
+            return joined(wholes), joined(rests), np.concatenate(known)
+        z = self.phasors(turns, which)
+        whole = self.within.mean_squares(
+            np.trace(self._covariance(z, which), axis1=1, axis2=2), z, which
+        )
+        return whole, *self.within.conditioned(whole, z, which, draws)
+
     def values(
-        self,
-        turns: np.ndarray,
-        which: np.ndarray | slice = slice(None),
-        luck: Luck | None = None,
+        self, turns: np.ndarray, which: np.ndarray | slice = slice(None), fresh: bool = False
     ) -> np.ndarray:
         """The metric (n,) in windows ``which`` for members (n or 1, rotor).
 
-        A linear one without its noise, which ``quantile`` has. In the others noise takes its
-        chances in the windows, or those of ``luck``.
+        A linear one, and jitter, without noise. In ``MTF_loss`` noise takes its chances in the
+        windows.
+
+        Args:
+            fresh: noise is drawn for each value, not once for each window.
         """
         if self.metric.name in LINEAR:
             return np.linalg.norm(self.deviations(turns, which), axis=1)
         if isinstance(which, np.ndarray) and len(which) > AT_ONCE:
-            return np.concatenate([self.values(*part) for part in _parts(turns, which)])
-        return self._squared(self.phasors(turns, which), which, luck)
-
-    def _squared(self, z: np.ndarray, which: np.ndarray | slice, luck: Luck | None) -> np.ndarray:
+            return np.concatenate([self.values(*part, fresh) for part in _parts(turns, which)])
+        z = self.phasors(turns, which)
         if self.metric.name == "rms":
-            assert self.band is not None
-            total = np.full(len(z), np.trace(self.band) + np.sum(self.noise_powers))
-            if self.rotors:
-                share = weight(self.metric, self.f)
-                total = total + 0.5 * np.einsum("g,ngc->n", share, np.abs(z) ** 2)
-            return np.sqrt(total)
-        assert isinstance(self.slow, WindowParts)
-        covariance, smear = self.slow.about_line[which], self.slow.smear[which]
+            return self._band(z)
+        covariance = self._covariance(z, which)
+        if self.metric.name == "jitter":
+            return np.sqrt(np.maximum(np.trace(covariance, axis1=1, axis2=2), 0.0))
+        smear = self._smear(z, which)
+        if self.within is not None:
+            fortune = self.within.fortune(self.rng, len(z)) if fresh else self.fortune.of(which)
+            covariance, smear = self.within.drawn(covariance, smear, z, which, fortune)
+        return mtf_loss(covariance, smear, self.metric.spatial_frequency, half_circle(z.shape[2]))
+
+    def _band(self, z: np.ndarray) -> np.ndarray:
+        assert self.band is not None
+        total = np.full(len(z), np.trace(self.band) + np.sum(self.noise_powers))
         if self.rotors:
-            covariance = covariance + self._jitter_of_lines(z)
+            share = weight(self.metric, self.f)
+            total = total + 0.5 * np.einsum("g,ngc->n", share, np.abs(z) ** 2)
+        return np.sqrt(total)
+
+    def _smear(self, z: np.ndarray, which: np.ndarray | slice) -> np.ndarray:
+        """(n, c) of slow motion and lines."""
+        assert isinstance(self.slow, WindowParts)
+        smear = self.slow.smear[which]
+        if self.rotors:
             drift = Metric("smear", self.metric.window)
             smear = smear + np.sum(gain(drift, self.f)[:, None] * z, axis=1).real
-        if self.jittering is not None:
-            noise = self.jittering
-            luck = luck or noise.luck.of(which)
-            known = np.trace(covariance, axis1=1, axis2=2)
-            factor = noise.factor(known, z, which, luck)
-            covariance = factor[:, None, None] * (covariance + noise.jitter[which])
-            smear = smear + np.einsum("nab,nb->na", noise.smear[which], luck.direction)
-        if self.metric.name == "jitter":
-            return np.sqrt(np.trace(covariance, axis1=1, axis2=2))
-        directions = half_circle(z.shape[2])
-        return mtf_loss(covariance, smear, self.metric.spatial_frequency, directions)
+        return smear
+
+    def _covariance(self, z: np.ndarray, which: np.ndarray | slice) -> np.ndarray:
+        """(n, c, c) of jitter, of slow motion and lines together."""
+        assert isinstance(self.slow, WindowParts)
+        covariance = self.slow.about_line[which]
+        if not self.rotors:
+            return covariance
+        slow = self.slow.coefficients[which][:, 1:]
+        lines = self.coefficients_of_lines[1 : slow.shape[1] + 1]
+        mixed = slow.swapaxes(1, 2) @ np.einsum("mg,nga->nma", lines, z).real
+        return covariance + self._jitter_of_lines(z) + mixed + mixed.swapaxes(1, 2)
+
+    @cached_property
+    def coefficients_of_lines(self) -> np.ndarray:
+        """(order, group) as ``of_lines``."""
+        return of_lines(self.f, self.metric.window)
 
     def _jitter_of_lines(self, z: np.ndarray) -> np.ndarray:
         """(n, c, c) of coherent lines z about their mean and slope, exactly."""
@@ -264,7 +319,7 @@ class _Judge:
         if self.metric.name == "MTF_loss":
             if self.lines is None or phases == "given":
                 return float(np.mean(self.values(np.zeros((1, self.rotors)))))
-            return float(np.mean(self.values(*self.draws())))
+            return float(np.mean(self.values(*self.draws(), fresh=True)))
         total = self.slow_mean_square + float(np.sum(self.noise_powers))
         if self.rotors and self.lines is not None:
             if phases == "random":
@@ -277,7 +332,8 @@ class _Judge:
 
     def draws(self) -> tuple[np.ndarray, np.ndarray]:
         """Members (n, rotor) and windows (n,) drawn together, each independent of the others."""
-        n = int(self.effort * DRAWS)
+        smooth = self.within is not None and self.metric.name == "jitter"
+        n = int(self.effort * (SMOOTH_DRAWS if smooth else DRAWS))
         which = self.rng.integers(len(self.centers), size=n)
         return self.rng.uniform(0, 2 * np.pi, (n, self.rotors)), which
 
@@ -287,18 +343,23 @@ class _Judge:
         Members that reach far are tried in some windows; the best is improved there, and judged
         with the runners-up in all windows.
         """
-        some = np.linspace(0, len(self.centers) - 1, min(TRIED, len(self.centers))).astype(int)
-        quantile = lambda turns, which: self.quantile(confidence, turns[None], which)  # noqa: E731
+        smooth = self.deviating is not None or self.within is not None
+        most = TRIED_IN_NOISE if smooth and self.metric.name != "MTF_loss" else TRIED
+        some = np.linspace(0, len(self.centers) - 1, min(most, len(self.centers))).astype(int)
+
+        def quantile(turns: np.ndarray) -> float:
+            return self.quantile(confidence, turns[None], some, FEWER_ANGLES)
+
         tried = self.far_reaching()
-        first = np.array([quantile(turns, some) for turns in tried])
+        first = np.array([quantile(turns) for turns in tried])
         best = tried[np.argsort(-first)[:3]]
         improved = minimize(
-            lambda turns: -quantile(turns, some) / (np.max(first) or 1.0),
+            lambda turns: -quantile(turns) / (np.max(first) or 1.0),
             best[0],
             method="Nelder-Mead",
             options={"maxfev": 25 * self.rotors, "xatol": 1e-2, "fatol": 1e-4},
         )
-        return max(quantile(turns, slice(None)) for turns in (*best, improved.x))
+        return max(self.quantile(confidence, turns[None]) for turns in (*best, improved.x))
 
     def far_reaching(self) -> np.ndarray:
         """Members (n, rotor) whose lines together reach far along some direction, each.
@@ -336,7 +397,7 @@ class _Judge:
         Args:
             alone: the rotors' phases are as given.
         """
-        noisy = self.deviating is not None or self.jittering is not None
+        noisy = self.deviating is not None or self.within is not None
         count = int(self.effort * max(MEMBERS, np.ceil(TAIL / (1.0 - confidence))))
         if alone and not noisy:
             members, chance = np.zeros((1, self.rotors)), np.ones(1)
@@ -367,11 +428,7 @@ class _Judge:
         """
         looks = np.unique(np.linspace(0, len(self.centers) - 1, LOOKS).astype(int))
         if self.metric.name not in LINEAR:
-            looks = np.unique(np.linspace(0, len(self.centers) - 1, 4 * LOOKS).astype(int))
-            noise = self.jittering
-            luck = noise.worst(chance, self.rng) if noise is not None else None
-            each = [self.values(members, np.full(len(members), k), luck) for k in looks]
-            return np.asarray(np.max(each, axis=0))
+            return self._over_looks(members, chance)
         assert isinstance(self.slow, np.ndarray)
         if not self.rotors:
             return np.full(len(members), np.max(np.linalg.norm(self.slow, axis=1)))
@@ -388,6 +445,44 @@ class _Judge:
             largest = np.maximum(largest, total)
         # the true direction lies half a step at most from those looked at
         return largest / (np.cos(np.pi / DIRECTIONS) if len(around) > 2 else 1.0)
+
+    def _over_looks(self, members: np.ndarray, chance: np.ndarray) -> np.ndarray:
+        """Largest value (n,) of a metric that is not linear, looked at in some windows.
+
+        All members' noise is at its largest in each of them, and of ``MTF_loss`` jitter and smear
+        along a direction together: an upper bound.
+        """
+        sides, count = np.ones((1, 1)), 4 * LOOKS
+        noise, loss = self.within, self.metric.name == "MTF_loss"
+        if noise is not None and loss:
+            sides = half_circle(noise.components)
+            sides, count = sides[:: max(1, len(sides) // SIDES)], LOOKS
+        looks = np.unique(np.linspace(0, len(self.centers) - 1, count).astype(int))
+        largest = np.zeros(len(members))
+        alone = noise.largest(chance, self.duration) if noise is not None else chance
+        for side in sides:
+            along = noise.along(side) if noise is not None and loss else noise
+            # chances of either component, all around
+            one = alone if len(sides) == 1 else np.sqrt(alone)
+            for k in looks:
+                which = np.full(len(members), k)
+                if along is None:
+                    largest = np.maximum(largest, self.values(members, which))
+                    continue
+                z = self.phasors(members, which)
+                covariance = self._covariance(z, which)
+                if not loss:
+                    known = np.trace(covariance, axis1=1, axis2=2)
+                    found = np.sqrt(along.mean_squares(known, z, which).each(one))
+                else:
+                    known = np.einsum("a,nab,b->n", side, covariance, side)
+                    jitter = along.mean_squares(known, (z @ side)[..., None], which).each(one)
+                    spread = np.sqrt(along.drift[which, 0, 0])
+                    smear = np.abs(self._smear(z, which) @ side) + ndtri(0.5 + 0.5 * one) * spread
+                    unit, nu = np.ones((1, 1)), self.metric.spatial_frequency
+                    found = mtf_loss(jitter[:, None, None], smear[:, None], nu, unit)
+                largest = np.maximum(largest, found)
+        return largest
 
 
 def _parts(turns: np.ndarray, which: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
