@@ -6,6 +6,7 @@ from scipy.signal import butter, sosfiltfilt
 
 import quietbus as qb
 from quietbus.analysis.motion import ImageMotion, SampledSignal
+from quietbus.analysis.noise import Noise
 from quietbus.analysis.pointing import evaluate
 from quietbus.plots.pointing import cumulative_spectrum, powers
 from quietbus.verification import ARCSEC, image_motion
@@ -154,3 +155,45 @@ def test_what_noise_and_ripple_do_not_allow_is_refused_before_the_run(changes, m
     asked = scenario([f"RPE(camera, window = {window}, start = 0) <= 1"], **changes)
     with pytest.raises(qb.ScenarioError, match=said):
         qb.verify(asked, method)
+
+
+RED = {
+    "requirements": [
+        f"jitter(camera, window = {window} ms, confidence = {level}{more}) <= 1e-4 arcsec"
+        for window in (10, 20, 200)
+        for level in (0.5, 0.997)
+        for more in ("", ", interpretation = mixed", ", component = 0")
+    ]
+    + [f"jitter(camera, window = {window} ms) <= 1e-4 arcsec" for window in (10, 20, 200)],
+}
+
+
+def red_noise(both):
+    """A torque's density over the inertia squared and f^4, as a free satellite has it."""
+    run = both["harmonic"].run
+    motion = image_motion(run, "camera")
+    f = np.geomspace(1.0, 1000.0, 300)
+    density = np.tile((1e-16 / f**4)[None, :, None, None, None] * np.eye(2), (2, 1, 1, 1, 1))
+    noise = Noise(np.array([0.0, END]), f, density, ("rotor 0, broadband",))
+    return ImageMotion(motion.signal, motion.lines, noise)
+
+
+def test_no_statistic_of_jitter_is_next_to_nothing_beside_red_noise(both, monkeypatch):
+    """Quantiles came to zero, and "met", where the RMS was above the limit: most of the noise's
+    power lies below what a window sees."""
+    asked = scenario(RED["requirements"])
+    monkeypatch.setattr("quietbus.verification.image_motion", lambda *_: red_noise(both))
+    verification = qb.verification.Verification(
+        both["harmonic"].run.assign_attrs(scenario=asked.to_yaml())
+    )
+    rms = {
+        v.metric.window: v.value for v in verification.verdicts if v.statistic.confidence is None
+    }
+    heard = []
+    verification.judge(progress=lambda what, share: heard.append((what, share)))
+    assert heard[0] == ("judging jitter 10 ms", 0.0)
+    assert heard[-1] == ("judged", 1.0)
+    for verdict in verification.verdicts[:-3]:
+        least = 0.25 if verdict.statistic.confidence == 0.5 else 0.7
+        assert least * rms[verdict.metric.window] < verdict.value < 5.0 * rms[verdict.metric.window]
+    assert not verification.met

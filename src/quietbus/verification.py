@@ -1,6 +1,7 @@
 """Pointing requirements of a scenario against what a run of it shows (``quietbus verify``)."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import version
 from typing import Any
@@ -10,6 +11,7 @@ import xarray as xr
 from scipy.spatial.transform import Rotation
 
 from quietbus.analysis.channels import json_ready
+from quietbus.analysis.chi_square import UnsoundStatisticError
 from quietbus.analysis.motion import ImageMotion, Lines, SampledSignal
 from quietbus.analysis.noise import Noise
 from quietbus.analysis.pointing import Statistic, check_stretch, contributions, evaluate
@@ -88,6 +90,7 @@ class Verification:
     """
 
     run: xr.Dataset
+    _found: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         time = self.run["time"].to_numpy()
@@ -123,9 +126,43 @@ class Verification:
     @cached_property
     def verdicts(self) -> tuple[Verdict, ...]:
         """In the order of the scenario."""
-        return tuple(self._verdict(requirement) for requirement in self.scenario.requirements)
+        return tuple(self._verdict(i) for i in range(len(self.scenario.requirements)))
 
-    def _verdict(self, requirement: Any) -> Verdict:
+    def judge(
+        self, curves: bool = False, progress: Callable[[str, float], None] | None = None
+    ) -> None:
+        """Find all verdicts now, which otherwise are found when they are asked for.
+
+        Args:
+            curves: against exposure time, too.
+            progress: called with what is being judged, and the share that is done.
+        """
+        requirements = self.scenario.requirements
+        steps = len(requirements) * (1 + (CURVE if curves else 0))
+        done = 0
+
+        def step() -> None:
+            nonlocal done
+            if progress is not None:
+                progress(what, done / steps)
+            done += 1
+
+        for i, requirement in enumerate(requirements):
+            what = f"judging {_name(_metric(requirement))}"
+            step()
+            self._verdict(i)
+            if curves:
+                self.curve(i, step)
+                done = (i + 1) * (1 + CURVE)  # some metrics have no curve
+        if progress is not None:
+            progress("judged", 1.0)
+
+    def _verdict(self, i: int) -> Verdict:
+        if i not in self._found:
+            self._found[i] = self._judge(self.scenario.requirements[i])
+        return self._found[i]
+
+    def _judge(self, requirement: Any) -> Verdict:
         last = float(self.run["time"][-1])
         metric, stretch = _metric(requirement), _stretch(requirement, last)
         motion = self._judged(requirement)
@@ -133,6 +170,12 @@ class Verification:
             requirement.confidence, requirement.interpretation, requirement.rotor_phases
         )
         parts = contributions(motion, metric, stretch)
+        try:
+            value = evaluate(motion, metric, stretch, statistic)
+        except UnsoundStatisticError as error:
+            raise UnsoundStatisticError(
+                f"{_name(metric)} of {requirement.line_of_sight} is withheld: {error}"
+            ) from None
         least = NOTHING * np.linalg.norm(list(parts.values()))
         return Verdict(
             name=_name(metric),
@@ -141,7 +184,7 @@ class Verification:
             statistic=statistic,
             meaning=_meaning(metric, statistic, motion),
             stretch=stretch,
-            value=evaluate(motion, metric, stretch, statistic),
+            value=value,
             limit=requirement.at_most,
             contributions={name: rms for name, rms in parts.items() if rms > least},
         )
@@ -155,28 +198,37 @@ class Verification:
         """Whether all requirements are."""
         return all(verdict.met for verdict in self.verdicts)
 
-    def curve(self, i: int) -> tuple[np.ndarray, np.ndarray] | None:
+    def curve(
+        self, i: int, progress: Callable[[], None] | None = None
+    ) -> tuple[np.ndarray, np.ndarray] | None:
         """Requirement i's metric [rad, or 1] against exposure time [s]; None if it has no window.
 
-        From a thirtieth to thirty times its window, as far as the judged stretch goes.
+        From a thirtieth to thirty times its window, as far as the judged stretch goes, and not
+        longer than tau of windows that must not overlap.
         """
-        if count("i", i, least=0) >= len(self.verdicts):
-            raise ValueError(f"i: expected a requirement's number below {len(self.verdicts)}")
-        verdict = self.verdicts[i]
+        requirements = self.scenario.requirements
+        if count("i", i, least=0) >= len(requirements):
+            raise ValueError(f"i: expected a requirement's number below {len(requirements)}")
+        verdict = self._verdict(i)
         metric = verdict.metric
         if not metric.window:
             return None
-        motion = self._judged(self.scenario.requirements[i])
+        if ("curve", i) in self._found:
+            return self._found["curve", i]
+        motion = self._judged(requirements[i])
         start, end = verdict.stretch
         longest = end - start - (metric.span - metric.window)
+        if metric.name in ("PDE", "PRE"):
+            longest = min(longest, metric.tau)
         windows = np.geomspace(metric.window / 30.0, min(30.0 * metric.window, longest), CURVE)
-        values = [
-            evaluate(
-                motion, metric.with_window(T), verdict.stretch, verdict.statistic, CURVE_EFFORT
-            )
-            for T in windows
-        ]
-        return windows, np.array(values)
+        values = []
+        for T in windows:
+            if progress is not None:
+                progress()
+            at = metric.with_window(T)
+            values.append(evaluate(motion, at, verdict.stretch, verdict.statistic, CURVE_EFFORT))
+        self._found["curve", i] = windows, np.array(values)
+        return self._found["curve", i]
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON; see docs/pointing.md."""
@@ -212,8 +264,13 @@ class Verification:
 
 
 def _metric(requirement: Any) -> Metric:
-    fields = ("window", "tau", "above", "spatial_frequency")
-    return Metric(requirement.metric, *(getattr(requirement, name, 0.0) for name in fields))
+    fields = {
+        name: getattr(requirement, name, 0.0)
+        for name in ("window", "tau", "above", "spatial_frequency")
+    }
+    if hasattr(requirement, "middle_to_middle"):
+        fields["tau"] = requirement.middle_to_middle
+    return Metric(requirement.metric, **fields)
 
 
 def _stretch(requirement: Any, last: float) -> tuple[float, float]:

@@ -26,7 +26,7 @@ T, TAU, NU = 0.013, 0.21, 20.0  # no whole number of periods of anything
 
 
 def metric(name, window=T):
-    return Metric(name, window, TAU, 10.0, NU)
+    return Metric(name, 0.0 if name == "stability" else window, TAU, 10.0, NU)
 
 
 def sampled(function, end=10.0, rate=1000.0):
@@ -69,7 +69,8 @@ SINE_AMPLITUDE = {
     "smear": A * 6 * abs(J1),
     "PDE": A * 2 * abs(np.sin(np.pi * F * TAU) * SINC),
     "PRE": A * 2 * abs(np.sin(np.pi * F * TAU) * SINC),
-    "stability": A * 2 * abs(np.sin(np.pi * F * TAU) * SINC),
+    "windowed_stability": A * 2 * abs(np.sin(np.pi * F * TAU) * SINC),
+    "stability": A * 2 * abs(np.sin(np.pi * F * TAU)),
 }
 
 
@@ -115,7 +116,7 @@ def test_ramp_in_every_metric():
     assert of("MPE", 0.5) == pytest.approx(RATE * 5.0, rel=1e-3)
     assert of("RPE") == pytest.approx(RATE * T / np.sqrt(12.0), rel=2e-2)
     assert of("RPE", 0.9) == pytest.approx(RATE * T * 0.45, rel=2e-2)
-    for name in ("PDE", "PRE", "stability"):
+    for name in ("PDE", "PRE", "windowed_stability", "stability"):
         assert of(name, 0.3) == pytest.approx(RATE * TAU, rel=1e-9)
     assert of("smear", 0.3) == pytest.approx(RATE * T, rel=1e-9)
     assert of("jitter") < 1e-12 * RATE
@@ -149,11 +150,11 @@ def random_motion(request):
 def test_noise_in_time_agrees_with_its_density(random_motion, name):
     """Within chi-square's bound at 1e-4, for as many independent windows as there are."""
     band, motion = random_motion
-    which = Metric(name, 0.05, 0.33, 10.0)
+    which = Metric(name, 0.0 if name == "stability" else 0.05, 0.33, 10.0)
     f = np.array([0.0, band])
     expected = mean_square_of_density(which, f, np.full(2, SIGMA**2 / band))
     found = evaluate(motion, which, (0.0, LENGTH), RMS) ** 2
-    free = LENGTH / 0.05 * (0.7 if name in ("PDE", "PRE", "stability") else 1.0)
+    free = LENGTH / 0.05 * (0.7 if name in ("PDE", "PRE", "windowed_stability") else 1.0)
     low, high = chi2.ppf([1e-4, 1 - 1e-4], 0.5 * free) / (0.5 * free)
     assert low < found / expected < high
 

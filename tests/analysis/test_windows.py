@@ -68,7 +68,9 @@ def test_known_weights():
     assert weight(Metric("displacement", T), f) == pytest.approx(sinc)
     assert weight(Metric("RPE", T), f) == pytest.approx(1.0 - sinc, abs=1e-12)
     stability = 2.0 * (1.0 - np.cos(2 * np.pi * f * tau)) * sinc
-    assert weight(Metric("stability", T, tau), f) == pytest.approx(stability, abs=1e-12)
+    assert weight(Metric("windowed_stability", T, tau), f) == pytest.approx(stability, abs=1e-12)
+    change = 2.0 * (1.0 - np.cos(2 * np.pi * f * tau))  # of the line of sight itself
+    assert weight(Metric("stability", tau=tau), f) == pytest.approx(change, abs=1e-12)
     smear = np.array([0.0, *(36 * ((np.sin(u[1:]) / u[1:] - np.cos(u[1:])) / u[1:]) ** 2)])
     assert weight(Metric("smear", T), f) == pytest.approx(smear, abs=1e-12)
     jitter = 1.0 - sinc - smear / 12.0
@@ -83,7 +85,7 @@ WHITE = {  # of one-sided density S0 over all frequencies, times T / S0
     "MPE": 0.5,
     "smear": 6.0,
     "PDE": 1.0,
-    "stability": 1.0,
+    "windowed_stability": 1.0,
 }
 
 

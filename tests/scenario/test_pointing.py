@@ -59,7 +59,32 @@ def test_a_direction_is_seen_across():
     assert line.image() @ d == pytest.approx([0, 0])
 
 
+def test_separation_is_from_the_end_of_a_window_to_the_beginning_of_the_next():
+    """As ECSS gives it; tau is from middle to middle."""
+    (apart,) = read("PRE(camera, window = 5 ms, separation = 2 s) <= 1 arcsec").requirements
+    (between,) = read("PRE(camera, window = 5 ms, tau = 2.005 s) <= 1 arcsec").requirements
+    assert apart.middle_to_middle == pytest.approx(between.middle_to_middle)
+    (adjacent,) = read("PDE(camera, window = 5 ms, separation = 0) <= 1 arcsec").requirements
+    assert adjacent.middle_to_middle == 5e-3
+
+
 REFUSED = [
+    (
+        "PDE(camera, window = 5 ms, tau = 4 ms) <= 1 arcsec",
+        "requirements[0].tau (line {}): expected the window (0.005 s) or more, or the two windows overlap; got 0.004 s. windowed_stability may overlap",
+    ),
+    (
+        "PDE(camera, window = 5 ms, tau = 6 ms, separation = 1 ms) <= 1 arcsec",
+        "requirements[0] (line {}): expected one of tau and separation, got tau and separation",
+    ),
+    (
+        "stability(camera, window = 5 ms, tau = 6 ms) <= 1 arcsec",
+        "requirements[0].window (line {}): stability is the change from one instant to another, tau later; of the means of windows it is windowed_stability",
+    ),
+    (
+        "MKE(camera, window = 5 ms) <= 1 arcsec",
+        "requirements[0].metric (line {}): MKE: an error of the attitude as known on board, which a scenario has no sensors for: the control knows the true attitude. Expected an error of pointing: APE, MPE, RPE",
+    ),
     (
         "{metric: RPE, line_of_sight: camera, window: 5 m, at_most: 1}",
         "requirements[0].window (line {}): expected a time in s, got '5 m' (a length?)",
@@ -82,11 +107,11 @@ REFUSED = [
     ),
     (
         "{metric: RPEE, line_of_sight: camera}",
-        "requirements[0].metric (line {}): expected one of APE, displacement, jitter, MPE, MTF_loss, PDE, PRE, rms, RPE, smear, stability, got 'RPEE'",
+        "requirements[0].metric (line {}): expected one of APE, displacement, jitter, MPE, MTF_loss, PDE, PRE, rms, RPE, smear, stability, windowed_stability, got 'RPEE'",
     ),
     (
         "{line_of_sight: camera}",
-        "requirements[0].metric (line {}): expected one of APE, displacement, jitter, MPE, MTF_loss, PDE, PRE, rms, RPE, smear, stability, got nothing",
+        "requirements[0].metric (line {}): expected one of APE, displacement, jitter, MPE, MTF_loss, PDE, PRE, rms, RPE, smear, stability, windowed_stability, got nothing",
     ),
     (
         "{metric: APE, line_of_sight: telescope, at_most: 1}",
@@ -126,7 +151,7 @@ REFUSED = [
     ),
     (
         "{metric: PDE, line_of_sight: camera, window: 1, at_most: 1}",
-        "requirements[0].tau (line {}): expected a time in s, got nothing",
+        "requirements[0] (line {}): expected one of tau and separation, got neither",
     ),
     (
         "{metric: rms, line_of_sight: camera, at_most: 1}",

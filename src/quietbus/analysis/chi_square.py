@@ -5,6 +5,7 @@
 and scaled chi-square with the same first three (Imhof 1961).
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -125,6 +126,5 @@ def quantile(confidence: float, whole: MeanSquare, rest: MeanSquare, known: np.n
 
 def bounds(confidence: float, mean: float, variance: float) -> tuple[float, float]:
     """Cantelli's: between which a quantile lies, whatever the distribution."""
-    sigma = float(np.sqrt(max(variance, 0.0)))
-    odds = confidence / (1.0 - confidence)
-    return mean - sigma / np.sqrt(odds), mean + sigma * np.sqrt(odds)
+    sigma, odds = math.sqrt(max(variance, 0.0)), math.sqrt(confidence / (1.0 - confidence))
+    return mean - sigma / odds, mean + sigma * odds

@@ -4,6 +4,7 @@ The noise has zero mean, is independent of slow motion and lines, and is station
 spectrum that changes slowly, linearly between the looks (docs/theory.md, section 16).
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -117,7 +118,7 @@ def quantile(
     """
     m = int(np.clip(angles // len(deviation), 2, CIRCLE))
     low, high = bounds(confidence, *square_moments(deviation, spread))
-    start, end = np.sqrt(max(low, 0.0)) * (1.0 - 1e-6), np.sqrt(max(high, 0.0)) * (1.0 + 1e-6)
+    start, end = math.sqrt(max(low, 0.0)) * (1.0 - 1e-6), math.sqrt(max(high, 0.0)) * (1.0 + 1e-6)
     if end <= 0.0:
         return 0.0
 
@@ -131,8 +132,12 @@ def quantile(
             "variance of its square allow"
         )
     if off(start / end) <= 0.0:
-        return float(start)
-    return end * float(brentq(off, start / end, 1.0, xtol=1e-7)) if off(1.0) < 0.0 else float(end)
+        return start
+    return (
+        end * float(brentq(off, start / end, 1.0, xtol=1e-6, rtol=1e-6))
+        if off(1.0) < 0.0
+        else float(end)
+    )
 
 
 def square_moments(deviation: np.ndarray, spread: np.ndarray) -> tuple[float, float]:

@@ -43,7 +43,7 @@ TRIED = 2048  # windows in which the worst member is sought (temporal)
 TRIED_IN_NOISE = 512  # the same where noise makes the distribution smooth
 FEWER_ANGLES = 2**12  # of noise, in that search
 SMOOTH_DRAWS = 2**15  # in place of DRAWS, the same way
-SIDES = 8  # directions in which the largest MTF_loss with noise is sought
+SIDES = 4  # directions in which the largest MTF_loss with noise is sought
 STARTS, SWEEPS = 3, 4  # of that search
 TURN = 2.0 * np.pi
 DIRECTIONS = 120  # around the circle
@@ -345,10 +345,11 @@ class _Judge:
         """
         smooth = self.deviating is not None or self.within is not None
         most = TRIED_IN_NOISE if smooth and self.metric.name != "MTF_loss" else TRIED
+        most, angles = (most // 4, FEWER_ANGLES // 4) if self.effort < 1.0 else (most, FEWER_ANGLES)
         some = np.linspace(0, len(self.centers) - 1, min(most, len(self.centers))).astype(int)
 
         def quantile(turns: np.ndarray) -> float:
-            return self.quantile(confidence, turns[None], some, FEWER_ANGLES)
+            return self.quantile(confidence, turns[None], some, angles)
 
         tried = self.far_reaching()
         first = np.array([quantile(turns) for turns in tried])
@@ -456,7 +457,7 @@ class _Judge:
         noise, loss = self.within, self.metric.name == "MTF_loss"
         if noise is not None and loss:
             sides = half_circle(noise.components)
-            sides, count = sides[:: max(1, len(sides) // SIDES)], LOOKS
+            sides, count = sides[:: max(1, len(sides) // SIDES)], LOOKS // 2
         looks = np.unique(np.linspace(0, len(self.centers) - 1, count).astype(int))
         largest = np.zeros(len(members))
         alone = noise.largest(chance, self.duration) if noise is not None else chance
@@ -507,7 +508,8 @@ def check_stretch(first: float, last: float, metric: Metric, stretch: tuple[floa
             f"{end:g} s"
         )
     if metric.span > (end - start) * (1.0 + 1e-9):
-        what = "window and tau together" if metric.name in DRIFTS else "a window"
+        what = {"stability": "a tau"}.get(metric.name, "a window")
+        what = "window and tau together" if metric.name in DRIFTS and metric.window else what
         raise ValueError(
             f"expected {what} of at most {end - start:g} s, the stretch judged ({start:g} s to "
             f"{end:g} s); got {metric.span:g} s"
@@ -522,8 +524,8 @@ def _slow(
         return signal.at(centers)
     if metric.name in DRIFTS:
         first, second = (
-            signal.windows(centers + sign * 0.5 * metric.tau, metric.window).mean
-            for sign in (-1.0, 1.0)
+            signal.windows(t, metric.window).mean if metric.window else signal.at(t)
+            for t in (centers - 0.5 * metric.tau, centers + 0.5 * metric.tau)
         )
         return second - first
     parts = signal.windows(centers, metric.window)

@@ -36,13 +36,13 @@ def half_phases() -> np.ndarray:
 @cache
 def sizes() -> np.ndarray:
     """(order, k) of a unit line's coefficients, whose squares add to one."""
-    return np.stack([k * bessel(n, half_phases()) for n, k in zip(ORDERS, SCALE, strict=True)])
+    return np.stack([k * bessel(int(n), half_phases()) for n, k in zip(ORDERS, SCALE, strict=True)])
 
 
 def of_lines(lines_hz: np.ndarray, window: float) -> np.ndarray:
     """Coefficients (order, group) of unit phasors; none above the half phase."""
     u = np.pi * np.asarray(lines_hz, dtype=float) * window
-    each = [1j**n * k * bessel(n, u) for n, k in zip(ORDERS, SCALE, strict=True)]
+    each = [1j**n * k * bessel(int(n), u) for n, k in zip(ORDERS, SCALE, strict=True)]
     return np.where(u > HALF_PHASE, 0.0, np.reshape(each, (len(ORDERS), len(u))))
 
 

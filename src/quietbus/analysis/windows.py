@@ -14,13 +14,13 @@ from scipy.special import spherical_jn
 
 SMALL = 1.0  # [rad] u below which differences of nearly equal numbers become sums
 TERMS = np.arange(14)  # of those sums: j_14(1) is 1e-18
-DRIFTS = ("PDE", "PRE", "stability")
+DRIFTS = ("PDE", "PRE", "windowed_stability", "stability")
 MEANS = ("MPE", "displacement")
-INSTANTS = ("APE",)
-LINEAR = (*INSTANTS, *MEANS, "smear", *DRIFTS, "RPE")  # a deviation with a direction
+INSTANTS = ("APE", "stability")  # without a window
+LINEAR = ("APE", *MEANS, "smear", *DRIFTS, "RPE")  # a deviation with a direction
 METRICS = (
     *("APE", "MPE", "RPE", "PDE", "PRE"),
-    *("displacement", "smear", "jitter", "stability"),
+    *("displacement", "smear", "jitter", "windowed_stability", "stability"),
     *("rms", "MTF_loss"),
 )
 
@@ -52,6 +52,8 @@ class Metric:
             value = getattr(self, field)
             if needed and not (np.isfinite(value) and value > 0.0):
                 raise ValueError(f"{self.name}: expected a positive {field}, got {value!r}")
+        if self.name == "stability" and self.window:
+            raise ValueError("stability has no window: of two windows it is windowed_stability")
         if not (np.isfinite(self.above) and self.above >= 0.0):
             raise ValueError(f"{self.name}: expected a frequency for above, got {self.above!r}")
 
@@ -123,7 +125,7 @@ def gain(metric: Metric, frequency_hz: np.ndarray, at: np.ndarray | float = 0.0)
             return bessel(0, u) + 0j
         case "smear":
             return 6j * bessel(1, u)
-        case "PDE" | "PRE" | "stability":
+        case "PDE" | "PRE" | "windowed_stability" | "stability":
             return 2j * np.sin(np.pi * f * metric.tau) * bessel(0, u)
         case "RPE":
             return np.exp(2j * u * np.asarray(at)) - bessel(0, u)

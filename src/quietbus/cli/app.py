@@ -11,7 +11,7 @@ import typer
 from typer.core import TyperGroup
 
 from quietbus.cli.given import Asked
-from quietbus.cli.guard import BAD_INPUT, FAILED, BadInput
+from quietbus.cli.guard import BAD_INPUT, FAILED, BadInput, remove_empty_folders
 from quietbus.cli.session import on_interrupt
 from quietbus.processes import DeviceError
 from quietbus.words import visible_lines
@@ -75,3 +75,5 @@ def main() -> None:
         told = Asked.told(error) if isinstance(error, ScenarioError) else error
         print(f"quietbus: {visible_lines(str(told))}", file=sys.stderr)
         sys.exit(BAD_INPUT)
+    finally:
+        remove_empty_folders()

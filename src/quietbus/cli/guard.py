@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn
 
@@ -36,12 +37,26 @@ def check_file(file: Path, kind: str) -> None:
         raise BadInput(str(error)) from None
 
 
+_made: list[Path] = []  # folders that this command made, deepest first
+
+
+def remove_empty_folders() -> None:
+    """Take away the folders that were made and into which nothing came."""
+    for folder in _made:
+        with suppress(OSError):  # it has something in it, which is as it should be
+            folder.rmdir()
+    _made.clear()
+
+
 def make_folder(folder: Path, *numbers: str) -> None:
     """Make a folder for results, and refuse it where the files of their numbers have no place.
+
+    A command that ends without results takes it away again (``remove_empty_folders``).
 
     Args:
         numbers: names of files that are to be written there, JSON.
     """
+    _made.extend(each for each in (folder, *folder.parents) if not each.exists())
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except FileExistsError:

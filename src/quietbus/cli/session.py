@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from quietbus.cli.guard import FAILED
+from quietbus.cli.guard import FAILED, remove_empty_folders
 from quietbus.words import visible_lines
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ def on_interrupt(number: int, _frame: object) -> None:
         os.write(2, b"\nquietbus: stopping and keeping what is computed" + again + b"\n")
         return
     os.write(2, b"\nquietbus: interrupted\n")
+    remove_empty_folders()
     os._exit(FAILED)
 
 

@@ -21,7 +21,15 @@ from quietbus.cli.given import (
     speed,
 )
 from quietbus.cli.guard import BadInput, fail, make_folder
-from quietbus.cli.session import import_heavy, notes, print_table, progress, show_as_read, status
+from quietbus.cli.session import (
+    fraction,
+    import_heavy,
+    notes,
+    print_table,
+    progress,
+    show_as_read,
+    status,
+)
 from quietbus.cli.written import write_study
 
 if TYPE_CHECKING:
@@ -134,6 +142,7 @@ def verify(
         make_folder(output, "verification.json")
     import_heavy()
     from quietbus import api
+    from quietbus.analysis.chi_square import UnsoundStatisticError
     from quietbus.solve.harmonic import ResonanceError
 
     try:
@@ -145,6 +154,11 @@ def verify(
         fail(str(error))
     except ResonanceError as error:
         raise BadInput(f"{scenario}: {error}") from None
+    try:
+        with fraction() as tell:
+            verification.judge(curves=not as_json, progress=tell)
+    except UnsoundStatisticError as error:
+        fail(str(error))
     numbers = verification.to_dict()
     if as_json:
         print(json.dumps(numbers, indent=2, allow_nan=False))

@@ -191,13 +191,55 @@ class WindowRequirement(_Requirement):
     at_most: AngleLimit
 
 
-class DriftRequirement(_Requirement):
-    """From one window to another, tau later."""
+class ChangeRequirement(_Requirement):
+    """From one instant to another, tau later."""
 
-    metric: Literal["PDE", "PRE", "stability"]
+    metric: Literal["stability"]
+    tau: Duration
+    at_most: AngleLimit
+
+
+class WindowedChangeRequirement(_Requirement):
+    """From the mean of one window to that of another, whose middle is tau later."""
+
+    metric: Literal["windowed_stability"]
     window: Duration
     tau: Duration
     at_most: AngleLimit
+
+
+class DriftRequirement(_Requirement):
+    """From the mean of one window to that of another, which does not overlap it.
+
+    Either tau, from middle to middle, or the separation, from end to beginning.
+    """
+
+    metric: Literal["PDE", "PRE"]
+    window: Duration
+    tau: Duration | None = None
+    separation: StartTime | None = None
+    at_most: AngleLimit
+
+    @model_validator(mode="after")
+    def _check_windows(self) -> Self:
+        findings = Findings()
+        given = [key for key in ("tau", "separation") if getattr(self, key) is not None]
+        if len(given) != 1:
+            got = " and ".join(given) or "neither"
+            findings.add((), f"expected one of tau and separation, got {got}")
+        elif self.tau is not None and self.tau < self.window * (1.0 - 1e-9):
+            findings.add(
+                "tau",
+                f"expected the window ({self.window:g} s) or more, or the two windows overlap; got "
+                f"{self.tau:g} s. windowed_stability may overlap",
+            )
+        findings.raise_any()
+        return self
+
+    @property
+    def middle_to_middle(self) -> float:
+        """[s] from one window to the next."""
+        return self.window + (self.separation or 0.0) if self.tau is None else self.tau
 
 
 _FORMS: dict[str, type[_Requirement]] = {
@@ -206,11 +248,22 @@ _FORMS: dict[str, type[_Requirement]] = {
         InstantRequirement,
         WindowRequirement,
         DriftRequirement,
+        ChangeRequirement,
+        WindowedChangeRequirement,
         BandRequirement,
         LossRequirement,
     )
     for name in form.model_fields["metric"].annotation.__args__  # type: ignore[union-attr]
 }
+KNOWLEDGE = ("AKE", "MKE", "RKE")
+NO_KNOWLEDGE = (
+    "an error of the attitude as known on board, which a scenario has no sensors for: the control "
+    "knows the true attitude. Expected an error of pointing: APE, MPE, RPE"
+)
+NO_WINDOW = (
+    "stability is the change from one instant to another, tau later; of the means of windows it is "
+    "windowed_stability"
+)
 EXAMPLE = "RPE(camera, window = 5 ms, confidence = 0.997) <= 0.1 arcsec"
 NO_REQUIREMENTS = f"""expected one or more, for example:
 
@@ -236,7 +289,11 @@ def _read(value: Any) -> Any:
         raise expected(f"a mapping with the key metric, or a text like {EXAMPLE!r}", value)
     findings = Findings()
     metric = value.get("metric")
-    if not isinstance(metric, str) or metric not in _FORMS:
+    if metric in KNOWLEDGE:
+        findings.add("metric", f"{metric}: {NO_KNOWLEDGE}")
+    elif metric == "stability" and "window" in value:
+        findings.add("window", NO_WINDOW)
+    elif not isinstance(metric, str) or metric not in _FORMS:
         error = expected(f"one of {', '.join(sorted(_FORMS, key=str.lower))}", metric)
         findings.add("metric", error.message())
     findings.raise_any()
@@ -274,7 +331,9 @@ Requirement = Annotated[
     | Annotated[InstantRequirement, Tag("<InstantRequirement>")]
     | Annotated[BandRequirement, Tag("<BandRequirement>")]
     | Annotated[WindowRequirement, Tag("<WindowRequirement>")]
-    | Annotated[DriftRequirement, Tag("<DriftRequirement>")],
+    | Annotated[DriftRequirement, Tag("<DriftRequirement>")]
+    | Annotated[ChangeRequirement, Tag("<ChangeRequirement>")]
+    | Annotated[WindowedChangeRequirement, Tag("<WindowedChangeRequirement>")],
     Discriminator(_form),
     BeforeValidator(_read),
 ]
