@@ -110,9 +110,11 @@ def test_a_scenario_at_the_limit_is_read():
 
 
 def test_aliases_and_merges_that_end_are_read_with_the_lines_of_their_text():
-    text = "a: &a {x: 1, y: 2}\nb: &b {y: 3}\nc:\n  <<: [*b, *a]\n  z: *a\n"
+    text = "a: &a {x: 1, y: 2}\nb: &b {y: 3}\nc:\n  <<: [*b, *a]\n  z: *a\n  w: 1\n"
+    text += "d: {<<: *a, x: 9}\n"
     data, line_of = read_yaml(text, "s")
-    assert data["c"] == {"x": 1, "y": 3, "z": {"x": 1, "y": 2}}
+    assert data["c"] == {"x": 1, "y": 3, "z": {"x": 1, "y": 2}, "w": 1}
+    assert data["d"] == {"x": 9, "y": 2}  # what is written there is stronger than what is merged
     lines = [line_of(path) for path in (("c", "x"), ("c", "y"), ("c", "z"), ("c", "none"))]
     assert lines == [1, 2, 5, 3]
 
