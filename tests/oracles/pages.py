@@ -33,6 +33,21 @@ def assert_rounds(shown: str, *real: float) -> None:
         assert abs(float(number) - value) <= 0.501 * unit, f"{shown}: {value}"
 
 
+def assert_says(page: str, said: str, *real: float) -> None:
+    """A page has this sentence, with these numbers for its ``#``, to the last digit shown.
+
+    Args:
+        page: Markdown; powers of ten may be written in TeX.
+    """
+    text = " ".join(page.split()).replace(r"\cdot", "").replace(" 10^{", " 1 10^{")
+    text = re.sub(r"(\d)\s*10\^\{(-?\d+)\}", r"\1e\2", text.replace("$10^{", "$1 10^{"))
+    pattern = re.escape(" ".join(said.split())).replace(r"\#", rf"({NUMBER})")
+    found = re.search(pattern, text)
+    assert found, f"the page does not say: {said}"
+    for shown, value in zip(found.groups(), real, strict=True):
+        assert_rounds(shown, value)
+
+
 def assert_shown(shown: str, output: str) -> None:
     """Every line of ``shown`` comes in ``output``, in order; others may come in between.
 
