@@ -11,7 +11,7 @@ import pytest
 import typer
 
 import quietbus as qb
-from oracles.pages import assert_shown, table
+from oracles.pages import assert_rounds, assert_shown, table
 from quietbus import cli
 from quietbus.analysis.windows import METRICS
 from quietbus.results import CONTROL_VARIABLES, JOINT_VARIABLES, ROTOR_VARIABLES, VARIABLES, Summary
@@ -135,6 +135,21 @@ def test_readme_lists_the_commands():
     rows = table(_text("README.md"), ("command", "does"))
     documented = {re.search(r"quietbus (\w+)", row[0])[1] for row in rows if "quietbus" in row[0]}
     assert documented == set(typer.main.get_command(cli.app).commands)
+
+
+@pytest.mark.slow
+def test_readme_has_the_jitter_that_the_demo_finds():
+    """All lines have one frequency: the envelope is the peak that a direct run shows."""
+    envelope = {}
+    for mount in ("isolated", "rigid"):
+        run = qb.simulate("zhang2012", mount=mount, method="harmonic", duration=60, output_rate=0.1)
+        envelope[mount] = np.degrees(run["bus_rate_jitter_envelope"].isel(time=-1))
+    rows = table(_text("README.md"), ("jitter, peak", "isolated", "rigid", "ratio"))
+    for axis, isolated, rigid, ratio in rows:
+        found = [float(envelope[mount].sel(axis=axis)) for mount in envelope]
+        for shown, real in zip((isolated, rigid), found, strict=True):
+            assert_rounds(shown, real)
+        assert_rounds(ratio, 100.0 * found[0] / found[1])
 
 
 def test_readme_names_the_built_in_scenarios_and_the_settings():

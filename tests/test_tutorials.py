@@ -101,6 +101,12 @@ def test_tutorial_works_as_written(page, tmp_path, monkeypatch, capsys):
             raise AssertionError(f"{page.name}, line {line}: {error}") from None
 
 
+def test_tutorials_are_numbered_as_their_files():
+    numbers = [re.match(r"# (\d+) ", page.read_text(encoding="utf-8"))[1] for page in PAGES]
+    assert numbers == [page.stem.partition("-")[0] for page in PAGES]
+    assert sorted(map(int, numbers)) == list(range(1, len(PAGES) + 1))
+
+
 @pytest.mark.parametrize("name", sorted(typer.main.get_command(cli.app).commands))
 def test_every_command_has_a_tutorial(name):
     commands = [

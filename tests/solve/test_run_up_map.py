@@ -1,10 +1,14 @@
 """Run-ups by the direct solver through the platform's modes, against the quasi-steady map."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import quietbus as qb
+from oracles.pages import assert_says
 
+PAGE = (Path(__file__).parents[2] / "docs" / "jitter.md").read_text(encoding="utf-8")
 RPM = np.pi / 30.0
 
 
@@ -32,7 +36,10 @@ def test_a_slow_run_up_follows_the_map_the_closer_the_slower():
 
     About z there is none to speak of, and a few per mille are left by the average over four turns.
     """
-    errors = np.array([run_up(seconds, 500.0).error for seconds in (40.0, 160.0)])
+    fast, *errors = np.array([run_up(seconds, 500.0).error for seconds in (10.0, 40.0, 160.0)])
+    percent = [100.0 * np.max(each) for each in (fast, *errors)]
+    assert_says(PAGE, "within # % of the largest amplitude", percent[0])
+    assert_says(PAGE, "it takes 10 s, # % in 40 s and # % in 160 s", *percent[1:])
     assert np.max(errors[0]) < 0.15
     assert np.max(errors[1]) < 0.04
     assert np.all(errors[1] < np.maximum(0.4 * errors[0], 0.003))
