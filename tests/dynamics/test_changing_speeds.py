@@ -19,7 +19,7 @@ from quietbus.dynamics.invariants import (
     strut_energy,
 )
 from quietbus.dynamics.rotor_torques import rotor_torques
-from quietbus.validate.checks import over_time
+from quietbus.validate.flight import over_time
 from quietbus.validate.states import kicked_state, random_state
 from quietbus.validate.trajectory import fly, held_gimbals
 

@@ -25,9 +25,9 @@ from quietbus.dynamics.invariants import (
     strut_energy,
 )
 from quietbus.spatial.rotation import quaternion_to_matrix
-from quietbus.validate.checks import lossless, over_time
+from quietbus.validate.flight import over_time
 from quietbus.validate.states import kicked_state, random_state, random_wrench
-from quietbus.validate.trajectory import fly, held_gimbals
+from quietbus.validate.trajectory import fly, held_gimbals, lossless
 
 TIMES = np.linspace(0.0, 10.0, 11)
 MOUNTS = ["isolated", "rigid"]

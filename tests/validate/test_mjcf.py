@@ -9,7 +9,7 @@ import pytest
 from oracles.satellites import awkward_satellite, paper_satellite
 from quietbus.dynamics.closed_loop import initial_state
 from quietbus.dynamics.equations import Wrench
-from quietbus.validate.engine import import_mujoco
+from quietbus.reference.engine import import_mujoco
 from quietbus.validate.mjcf import write_mjcf
 from quietbus.validate.states import kicked_state, random_state
 from quietbus.validate.trajectory import fly, held_gimbals

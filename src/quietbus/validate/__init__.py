@@ -1,6 +1,8 @@
-"""The satellite against an independent engine (MuJoCo) and against conservation laws."""
+"""A scenario against an independent program (MuJoCo) and against conservation laws."""
 
-from quietbus.validate.checks import Check, validate
+import quietbus.jaxconfig  # noqa: F401
+from quietbus.validate.checks import export_mjcf, not_covered, validate
 from quietbus.validate.mjcf import write_mjcf
+from quietbus.validate.subject import Check
 
-__all__ = ["Check", "validate", "write_mjcf"]
+__all__ = ["Check", "export_mjcf", "not_covered", "validate", "write_mjcf"]

@@ -22,10 +22,12 @@ from quietbus.dynamics.state import State
 from quietbus.model.cmg import ClusterMoments
 from quietbus.model.load import Constant, Load
 from quietbus.model.satellite import Satellite
-from quietbus.model.variants import without_friction, without_leg_mass
+from quietbus.model.variants import without_friction, without_leg_mass, without_rotation
+from quietbus.reference.engine import import_mujoco
+from quietbus.reference.mjcf import ARMATURE
 from quietbus.spatial.inertia import point_inertia
-from quietbus.validate.engine import import_mujoco
-from quietbus.validate.mjcf import ARMATURE, nominal_spans_B, write_mjcf
+from quietbus.validate.mjcf import write_mjcf
+from quietbus.validate.translate import mechanism_of
 
 
 def massless_legs(satellite: Satellite) -> Satellite:
@@ -42,6 +44,13 @@ def held_gimbals(satellite: Satellite, wrench: Wrench) -> Satellite:
     )
     servo = replace(satellite.servo, bandwidth=jnp.zeros(()))
     return replace(satellite, controller=None, steering=None, loads=loads, servo=servo)
+
+
+def lossless(satellite: Satellite) -> Satellite:
+    """The satellite without damping, friction, loads and control, its rotors stopped."""
+    undamped = replace(satellite.legs, damping=jnp.zeros_like(satellite.legs.damping))
+    still = without_rotation(without_friction(replace(satellite, legs=undamped)))
+    return held_gimbals(still, Wrench.zero())
 
 
 def at_constant_speed(satellite: Satellite, state: State) -> tuple[Satellite, State]:
@@ -184,7 +193,7 @@ def fastest_rate(satellite: Satellite) -> float:
     unit = np.asarray(cluster.gimbal_mass + cluster.rotor_mass)
     inertia_P = np.asarray(satellite.plate.I_PPcm_P)  # with the units as points
     inertia_P = inertia_P + sum(map(point_inertia, unit, np.asarray(cluster.p_PC_P)))
-    spans = nominal_spans_B(satellite)
+    spans = mechanism_of(satellite).spans_B
     s = spans / np.linalg.norm(spans, axis=1, keepdims=True)
     fastest = float(np.max(np.abs(cluster.rotor_speed)))
     if satellite.mount == "rigid":

@@ -1,0 +1,159 @@
+"""The rotors' lines: the harmonic solver and `jitter` against flights of the reference."""
+
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from quietbus.analysis.jitter import AT_REST, rest_error, steady_jitter
+from quietbus.dynamics.state import State
+from quietbus.dynamics.vibration import NOTHING_SEEN
+from quietbus.model.disturbance import orders_of
+from quietbus.model.satellite import Satellite
+from quietbus.solve.direct import Tolerances
+from quietbus.solve.harmonic import (
+    HarmonicSolution,
+    ResonanceError,
+    integrate_harmonic,
+    on_periodic_solution,
+)
+from quietbus.validate.flight import SAMPLES, Flight
+from quietbus.validate.subject import Check, Subject, apart
+from quietbus.validate.translate import motion_of, state_of
+
+SMALL = 1e-9  # [rad] turn of the bus by all lines: what is of second order does not count
+TURNS = 8  # of the slowest rotor
+TIGHT = Tolerances(1e-10, 1e-14)  # of the slow motion
+SLOPPY = 0.05  # share of the lines by which a moving satellite's may be off
+
+
+def check_harmonic(subject: Subject, flight: Flight) -> list[Check]:
+    """A run in motion, and the lines at rest; nothing where no rotor has lines."""
+    try:
+        run = _run(subject.satellite, flight.start, float(flight.times[-1]))
+    except ResonanceError:
+        return []
+    turn = _size(run.jitter.amplitudes["bus_attitude"])
+    if run.slow.stopped is None and not turn > 0.0:
+        return []
+    checks = []
+    if subject.satellite.motor is None:  # whose lines are not those of rotors
+        checks.append(_in_motion(subject, flight, run))
+    at_rest = subject.changed(lambda data: _rest(data, SMALL / turn))
+    return checks + _at_rest(at_rest, subject.scenario.initial.steady)
+
+
+def _in_motion(subject: Subject, flight: Flight, run: HarmonicSolution) -> Check:
+    error = np.nan
+    if not run.slow.stopped:
+        states = run.slow.states
+        amplitude = run.jitter.amplitudes["bus_rate"]
+        lines = _in_time(subject.satellite, flight.times, states, amplitude)
+        theirs = np.array([motion.w_NB_B for motion in flight.theirs])
+        off = np.asarray(run.slow.outputs.bus_rate) + lines - theirs
+        error = float(np.max(np.linalg.norm(off, axis=1)) / _size(amplitude))
+    return Check(
+        "harmonic run",
+        "the same flight by the harmonic solver, slow motion and lines put together: the bus "
+        "rate, relative to the lines; the bound contains the run's own estimate of its error",
+        error,
+        SLOPPY + float(np.max(run.jitter.change_error)),
+    )
+
+
+def _at_rest(subject: Subject, steady: bool) -> list[Check]:
+    """From rest: slow motion by the harmonic solver, lines by `jitter`.
+
+    Args:
+        steady: start with the lines' own motion, so that they cause no transient.
+    """
+    satellite, reference = subject.satellite, subject.reference
+    angle = jnp.asarray(reference.mechanism.units.gimbal_angle)
+    amplitudes, small = _jitter(satellite, angle)
+    if not rest_error(small) <= AT_REST:
+        return []
+    speed = np.abs(reference.mechanism.units.speed)
+    duration = TURNS * 2.0 * np.pi / np.min(speed[speed > 0.0])
+    times = np.arange(SAMPLES + 1) * (duration / SAMPLES)
+    start = reference.initial()
+    run = _run(satellite, state_of(satellite, start), duration, steady)
+    if steady:
+        start = motion_of(satellite, on_periodic_solution(satellite, state_of(satellite, start)))
+    motions = reference.fly(start, times, 1e-10, 1e-16)
+    theirs = {
+        "bus_rate": np.array([motion.w_NB_B for motion in motions]),
+        "platform_rate": np.array([motion.w_NP_P for motion in motions]),
+    }
+    ours = {}
+    for name in theirs:
+        constant = np.broadcast_to(amplitudes[name], (len(times), *amplitudes[name].shape))
+        lines = _in_time(satellite, times, run.slow.states, constant)
+        ours[name] = np.asarray(getattr(run.slow.outputs, name)) + lines
+    return [
+        Check(
+            "lines from rest",
+            f"lines of `jitter`{'' if steady else ' and the transient that they cause'}, against "
+            f"{TURNS} turns flown with MuJoCo, control on: bus and plate rate, imbalance scaled "
+            "until it counts to first order only",
+            np.nan if run.slow.stopped else apart(theirs, ours),
+            1e-4,
+        )
+    ]
+
+
+def _run(
+    satellite: Satellite, start: State, duration: float, steady: bool = False
+) -> HarmonicSolution:
+    rate, view = SAMPLES / duration, NOTHING_SEEN
+    return integrate_harmonic(
+        satellite, start, duration, rate, steady=steady, view=view, tolerances=TIGHT
+    )
+
+
+def _in_time(
+    satellite: Satellite, times: np.ndarray, states: State | None, amplitude: np.ndarray
+) -> np.ndarray:
+    """Sum of all lines (n, axis) for amplitudes (n, cmg, order, axis)."""
+    assert states is not None
+    cluster = satellite.cluster
+    phi = np.asarray(cluster.rotor_phase) + np.outer(times, np.asarray(cluster.rotor_speed))
+    if states.rotor is not None:
+        phi = np.asarray(states.rotor.angle)
+    turned = np.exp(1j * phi[:, :, None] * np.asarray(orders_of(satellite.disturbance)))
+    return np.sum((amplitude * turned[..., None]).real, axis=(1, 2))
+
+
+def _size(amplitude: np.ndarray) -> float:
+    """Largest norm of the sum of all lines' amplitudes (n, cmg, order, axis)."""
+    return float(np.max(np.linalg.norm(np.sum(np.abs(amplitude), axis=(1, 2)), axis=-1)))
+
+
+@eqx.filter_jit
+def _jitter(satellite, gimbal_angle):
+    return steady_jitter(satellite, gimbal_angle)
+
+
+def _rest(data: dict[str, Any], scale: float) -> None:
+    """Let a scenario's satellite rest at its target, with its rotors' lines scaled.
+
+    Loads, guidance and run-up stay, doing nothing, so that programs do.
+    """
+    for load in data["loads"]:
+        load["force"] = load["torque"] = [0.0] * 3
+    data["initial"] = {"attitude": [0.0] * 3, "rate": [0.0] * 3, "steady": False}
+    data["target"]["attitude"] = [0.0] * 3
+    cluster = data["cluster"]
+    cluster.pop("gimbal_motor", None)
+    if "run_up" in cluster:
+        own = cluster.get("units") or [{}] * cluster["pyramid"]["units"]
+        speeds = [unit.get("rotor", {}).get("speed", cluster["rotor"]["speed"]) for unit in own]
+        cluster["run_up"].update(initial_speed=speeds, final_speed=speeds)
+    for rotor in [cluster["rotor"], *(unit.get("rotor", {}) for unit in cluster.get("units", []))]:
+        for lines in [rotor, *((rotor.get("disturbance") or {}).get("orders") or [])]:
+            for key in _LINES.intersection(lines):
+                lines[key] *= scale
+
+
+_LINES = {"static_imbalance", "dynamic_imbalance", "radial_force", "axial_force"}
+_LINES |= {"radial_torque", "axial_torque"}
