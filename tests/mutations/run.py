@@ -75,10 +75,15 @@ def judge(mutation: Mutation | None) -> dict:
         if mutation is not None:
             mutate(copy / mutation.file, mutation)
         paths = os.pathsep.join([folder, str(TESTS)])
+        # programs run once: the compiler's optimisation would take longer than it saves
+        quick = {
+            "XLA_FLAGS": "--xla_backend_optimization_level=0",
+            "JAX_ENABLE_COMPILATION_CACHE": "false",
+        }
         try:
             done = subprocess.run(
                 [sys.executable, "-c", CHECK, *scenarios],
-                env=os.environ | {"PYTHONPATH": paths},
+                env=os.environ | quick | {"PYTHONPATH": paths},
                 capture_output=True,
                 text=True,
                 timeout=TIMEOUT,

@@ -65,7 +65,7 @@ def test_dynamic_imbalance_is_the_product_of_inertia_of_two_points():
     """Masses m at (a, r) and (-a, -r) in the plane of spin and a direction at 0.4 rad."""
     m, a, r, phase = 0.01, 0.03, 0.1, 0.4
     across = np.array([0.0, r * np.cos(phase), r * np.sin(phase)])
-    points = [across + [a, 0.0, 0.0], -across - [a, 0.0, 0.0]]
+    points = [across + np.array([a, 0.0, 0.0]), -across - np.array([a, 0.0, 0.0])]
     added = sum(m * ((p @ p) * np.eye(3) - np.outer(p, p)) for p in points)
     rotor = {"spin_inertia": 1.0, "transverse_inertia": 1.0, "dynamic_imbalance": 2 * m * a * r}
     inertia = rotor_inertia(rotor | {"dynamic_imbalance_phase": phase})

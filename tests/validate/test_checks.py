@@ -65,7 +65,7 @@ def _wrong_lever(satellite):
 
 
 def _lower_joints_not_turned(satellite):
-    joints = np.array(awkward_scenario().isolator.legs.lower_joints) + [0.05, -0.1, 0.6]
+    joints = np.array(awkward_scenario().isolator.legs.lower_joints) + np.array([0.05, -0.1, 0.6])
     return replace(satellite, legs=replace(satellite.legs, p_BA_B=jax.numpy.asarray(joints)))
 
 
