@@ -108,6 +108,7 @@ MUTATIONS = (
         "self.stiffness * (length - self.free_length)",
         "self.stiffness * (length - self.nominal_length)",
         "preload of the struts ignored",
+        (WHEELS,),
     ),
     Mutation(
         "model/cmg.py",

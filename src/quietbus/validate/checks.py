@@ -17,8 +17,9 @@ from quietbus.validate.harmonic import check_harmonic
 from quietbus.validate.instants import check_instants, check_start
 from quietbus.validate.motions import kicked
 from quietbus.validate.subject import Check, Subject
+from quietbus.validate.trajectory import fastest_rate
 
-FLIGHT = 150.0  # [rad] that the fastest rotor turns in a flight
+FLIGHT = 150.0  # [rad] that the fastest rotor, or mode, turns in a flight
 
 
 def validate(
@@ -79,9 +80,9 @@ def run_checks(
 
 
 def _duration(subject: Subject) -> float:
-    """As long as the fastest rotor takes for a few turns, at most 1 s and the scenario's own."""
-    fastest = float(np.max(np.abs(subject.reference.mechanism.units.speed)))
-    return min(1.0, FLIGHT / max(fastest, 1.0), subject.scenario.simulation.duration)
+    """As long as the fastest rotor, or mode, takes for a few turns; at most 1 s."""
+    fastest = fastest_rate(subject.satellite)
+    return min(1.0, FLIGHT / fastest, subject.scenario.simulation.duration)
 
 
 def export_mjcf(scenario: Scenario) -> str:
@@ -98,6 +99,8 @@ def not_covered(scenario: Scenario) -> list[str]:
         said.append("broadband disturbance of the rotors: both programs fly without it")
     if scenario.cluster.gimbal_motor is not None:
         said.append("lines of the gimbal motors in harmonic runs; direct ones are checked")
+    if scenario.cluster.run_up is not None:
+        said.append("harmonic runs while rotors change speed; `jitter` is checked at their own")
     if scenario.isolator.mount == "rigid":
         said.append("joint forces of the legs, which a rigid mount leaves undetermined")
     if scenario.lines_of_sight or scenario.requirements:

@@ -38,7 +38,8 @@ def check_harmonic(subject: Subject, flight: Flight) -> list[Check]:
     if run.slow.stopped is None and not turn > 0.0:
         return []
     checks = []
-    if subject.satellite.motor is None:  # whose lines are not those of rotors
+    # ripple is no line of a rotor, and lines of rotors that run up begin with nothing
+    if subject.satellite.motor is None and subject.satellite.cluster.run_up is None:
         checks.append(_in_motion(subject, flight, run))
     at_rest = subject.changed(lambda data: _rest(data, SMALL / turn))
     return checks + _at_rest(at_rest, subject.scenario.initial.steady)

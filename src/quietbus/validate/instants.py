@@ -11,7 +11,7 @@ from quietbus.dynamics.closed_loop import control_signals, evaluate, state_rate
 from quietbus.dynamics.outputs import outputs
 from quietbus.reference.motion import Motion
 from quietbus.reference.satellite import Instant
-from quietbus.validate.motions import random_motion, random_time
+from quietbus.validate.motions import random_motion, random_times
 from quietbus.validate.subject import Check, Subject, apart
 from quietbus.validate.translate import motion_of, state_of
 
@@ -28,12 +28,14 @@ def check_start(subject: Subject) -> Check:
 
 
 def check_instants(subject: Subject, count: int, rng: np.random.Generator) -> list[Check]:
-    """At random times and motions: half of them tumbling, half near what the control follows."""
+    """At random times and motions: half of them tumbling, half near what the control follows.
+
+    Loads and commands that have corners are looked at on both sides of these, too.
+    """
     reference, satellite = subject.reference, subject.satellite
     duration = subject.scenario.simulation.duration
     pairs: list[tuple[float, Motion]] = []
-    for i in range(count):
-        t = random_time(reference, duration, rng)
+    for i, t in enumerate(random_times(reference, count, duration, rng)):
         near = None if i % 2 else float(10.0 ** rng.uniform(-4.0, -1.0))
         pairs.append((t, random_motion(reference, t, rng, near)))
     theirs = [reference.at(t, motion) for t, motion in pairs]
@@ -41,7 +43,7 @@ def check_instants(subject: Subject, count: int, rng: np.random.Generator) -> li
     stacked = jax.tree.map(lambda *each: jnp.stack(each), *states)
     times = jnp.array([t for t, _ in pairs])
     ours = jax.tree.map(np.asarray, _evaluated(satellite, times, stacked))
-    said = f"{count} random states and times against MuJoCo"
+    said = f"{len(pairs)} random states and times against MuJoCo"
     checks = [
         Check(
             "accelerations",

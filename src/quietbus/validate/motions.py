@@ -11,11 +11,20 @@ from quietbus.reference.satellite import ReferenceSatellite
 FASTEST = 600.0  # [rad/s] of rotors whose speeds change and have no limit
 
 
-def random_time(reference: ReferenceSatellite, duration: float, rng: np.random.Generator) -> float:
-    """An instant of a run [s]; every stretch between corners of loads and commands as likely."""
-    edges = np.array([0.0, *(t for t in reference.corners if 0.0 < t < duration), duration])
-    i = rng.integers(len(edges) - 1)
-    return float(rng.uniform(edges[i], edges[i + 1]))
+def random_times(
+    reference: ReferenceSatellite, count: int, duration: float, rng: np.random.Generator
+) -> list[float]:
+    """Instants of a run [s]: in stretches between corners of loads and commands, and at corners.
+
+    Args:
+        count: in stretches, each as likely; at most as many corners are looked at, from both sides.
+    """
+    corners = [t for t in reference.corners if 0.0 < t < duration]
+    edges, i = np.array([0.0, *corners, duration]), rng.integers(len(corners) + 1, size=count)
+    looked_at = rng.permutation(corners)[:count]
+    beside = 1e-7 * duration
+    within = rng.uniform(edges[i], edges[i + 1])
+    return [*within.tolist(), *(looked_at - beside).tolist(), *(looked_at + beside).tolist()]
 
 
 def random_motion(
