@@ -74,9 +74,9 @@ MUTATIONS = (
     ),
     Mutation(
         "build.py",
-        'channels[0] if line.whirl == "forward" else channels[-1]',
-        "channels[0]",
-        "backward whirl taken for forward",
+        "phases = own.phases(first_unit + j)",
+        "phases = own.phases(first_unit)",
+        "random phases of the order tables alike for all rotors",
     ),
     # the parts
     Mutation(

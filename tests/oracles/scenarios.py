@@ -115,10 +115,14 @@ def awkward_rigid() -> qb.Scenario:
     data = awkward_scenario().to_dict()
     data["name"], data["isolator"]["mount"] = "awkward-rigid", "rigid"
     data["cluster"]["gimbal_motor"] = {
-        "ripple": [{"per_turn": 24, "torque": 0.01, "phase": 0.5}],
+        "ripple": [
+            {"per_turn": 24, "torque": 0.01, "phase": 0.5},
+            {"per_turn": 36, "torque": 0.02},
+        ],
         "stepping": {"steps_per_turn": 200, "frequency": 60.0, "damping": 0.2, "harmonics": 2},
     }
     data["control"]["steering"] = {"law": "generalized_singularity_robust", "epsilon0": 0.2}
     data["initial"]["steady"] = True
+    data["cluster"]["rotor_phases"] = "random"
     data["loads"] = data["loads"][:2]
     return qb.Scenario.from_dict(data, "awkward-rigid")

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from quietbus.reference.mechanism import Data, Mechanism, unit_data
+from quietbus.reference.mechanism import Data, Mechanism, random_angles, seed_of, unit_data
 from quietbus.reference.motion import Motion
 
 COMPONENTS = ("radial_force", "axial_force", "radial_torque", "axial_torque")
@@ -89,6 +89,19 @@ class GimbalLines:
             return
         self._holding = self._motor.get("holding_bandwidth", 0.1 * cluster["gimbal_bandwidth"])
         self._inertia = _about_gimbal(mechanism)
+        # phases (unit, line) of ripple and, last, of the steps
+        said = [line["phase"] for line in self._motor.get("ripple", [])]
+        said.append(self._motor["stepping"]["phase"] if "stepping" in self._motor else 0.0)
+        drawn = [
+            random_angles(seed_of(unit), j, 3, len(said))
+            for j, unit in enumerate(unit_data(cluster))
+        ]
+        self._phase = np.array(
+            [
+                [own if s == "random" else s for s, own in zip(said, row, strict=True)]
+                for row in drawn
+            ]
+        )
 
     @property
     def any(self) -> bool:
@@ -101,11 +114,11 @@ class GimbalLines:
         if self._motor is None:
             return total
         angle, rate = motion.gimbal_angle, motion.gimbal_rate
-        for line in self._motor.get("ripple", []):
+        for i, line in enumerate(self._motor.get("ripple", [])):
             n = line["per_turn"]
             omega2 = (n * rate) ** 2
             free = omega2 / (omega2 + self._holding**2)
-            total += free * line["torque"] / self._inertia * np.cos(n * angle + line["phase"])
+            total += free * line["torque"] / self._inertia * np.cos(n * angle + self._phase[:, i])
         stepping = self._motor.get("stepping")
         if stepping is None:
             return total
@@ -116,7 +129,7 @@ class GimbalLines:
             follows = natural**2 / (
                 natural**2 - omega**2 + 2j * stepping["damping"] * natural * omega
             )
-            turned = 2.0 / n * follows * np.exp(1j * n * angle)
+            turned = 2.0 / n * follows * np.exp(1j * (n * angle + k * self._phase[:, -1]))
             total -= omega**2 * turned.imag
         return total
 

@@ -239,9 +239,28 @@ def _units(cluster: Data) -> Units:
         rotor_centre_G=gimbal.centre + stacked(lambda unit: unit["rotor"]["offset"]),
         bearing_G=stacked(bearing),
         speed=stacked(lambda unit: unit["rotor"]["speed"]),
-        phase=np.array(cluster.get("rotor_phases") or np.zeros(count), dtype=float),
+        phase=_phases(cluster, units),
         gimbal_angle=np.array(cluster.get("gimbal_angles") or np.zeros(count), dtype=float),
     )
+
+
+def _phases(cluster: Data, units: list[Data]) -> np.ndarray:
+    """Rotor angles at the start [rad]; random ones go by the seed and number of the rotor."""
+    said = cluster["rotor_phases"]
+    if said != "random":
+        return np.array(said, dtype=float)
+    drawn = [random_angles(seed_of(unit), j, 2, 1)[0] for j, unit in enumerate(units)]
+    return np.array(drawn)
+
+
+def seed_of(unit: Data) -> int:
+    """Seed of a rotor's random numbers."""
+    return (unit["rotor"].get("disturbance") or {"seed": 0})["seed"]
+
+
+def random_angles(seed: int, unit: int, stream: int, count: int) -> np.ndarray:
+    """Angles [rad] that scenarios call random: rotors' by stream 2, gimbal motors' by 3."""
+    return np.random.default_rng([seed, unit, stream]).uniform(-np.pi, np.pi, count)
 
 
 def rotor_inertia(rotor: Data) -> np.ndarray:
