@@ -66,7 +66,7 @@ def summary_table(summaries: Mapping[str, Summary]) -> Table:
     rates = [
         ("rate jitter {}, peak", "residual_rate"),
         ("rate jitter {}, RMS", "residual_rate_rms"),
-        ("rate jitter {}, worst phases", "worst_phases_rate"),
+        ("rate jitter {}, any phases", "worst_phases_rate"),
         ("slow rate {}, peak", "slow_rate"),
     ]
     if all(summary.worst_phases_rate is None for summary in summaries.values()):
@@ -85,9 +85,9 @@ def summary_table(summaries: Mapping[str, Summary]) -> Table:
     row("largest strut stroke", "mm", lambda s: 1e3 * s.peak_stroke)
     row("largest strut force", "N", lambda s: s.peak_strut_force)
     row("least singularity measure", "-", lambda s: s.minimum_singularity)
-    row("control torque asked for, peak", "N m", lambda s: s.peak_control_torque)
+    row("peak control torque", "N m", lambda s: s.peak_control_torque)
     if first.minimum_torque_share is not None:
-        row("least share of it delivered", "%", lambda s: 100.0 * _known(s.minimum_torque_share))
+        row("least torque share", "%", lambda s: 100.0 * _known(s.minimum_torque_share))
     return table
 
 
