@@ -234,6 +234,21 @@ def test_command_says_what_is_wrong_with_the_input(tmp_path, capsys):
     assert code == 2
 
 
+@pytest.mark.parametrize("command", ["verify", "fit"])
+def test_no_empty_folder_is_left_of_bad_input(command, tmp_path, capsys, monkeypatch):
+    """Nor those above it; one that was there before stays."""
+    file = tmp_path / "short.yaml"
+    file.write_text(scenario(["RPE(camera, window = 1 s) <= 1"], **STILL).to_yaml())
+    (tmp_path / "before").mkdir()
+    for folder in (tmp_path / "a" / "b", tmp_path / "before"):
+        monkeypatch.setattr("sys.argv", ["quietbus", command, str(file), "-o", str(folder)])
+        with pytest.raises(SystemExit) as end:
+            main()
+        assert end.value.code == 2
+        assert capsys.readouterr().err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["before", "short.yaml"]
+
+
 def turning_wheels(acceleration):
     """What a run of the wheels' demo tells of its rotors, at constant acceleration [rad/s^2]."""
     time, speed = np.linspace(0.0, 10.0, 101)[:, None], np.array([[100.0, 200.0, -150.0, 120.0]])
