@@ -243,7 +243,7 @@ def test_no_empty_folder_is_left_of_bad_input(command, tmp_path, capsys, monkeyp
     for folder in (tmp_path / "a" / "b", tmp_path / "before"):
         monkeypatch.setattr("sys.argv", ["quietbus", command, str(file), "-o", str(folder)])
         with pytest.raises(SystemExit) as end:
-            main()
+            cli.main()
         assert end.value.code == 2
         assert capsys.readouterr().err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["before", "short.yaml"]
