@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -79,6 +80,8 @@ def fit(
     from quietbus.analysis.waterfall import FitError
     from quietbus.measured import fit_waterfall
 
+    if not as_json and os.path.lexists(output):
+        _make_room(output)
     try:
         with status() as tell:
             tell("fitting")
@@ -86,8 +89,7 @@ def fit(
     except FitError as error:
         raise BadInput(f"{file}: {error}") from None
     if not as_json:
-        make_folder(output, "fit.json")  # not before: a wrong map leaves no folder
-        check_file(output / "disturbance.yaml", BLOCK)
+        _make_room(output)  # a new folder not before: a wrong map leaves none
     for note in fitted.notes:
         print(f"note: {visible_lines(note)}", file=sys.stderr)
     if as_json:
@@ -100,3 +102,8 @@ def fit(
         print_table(table)
     write_text(output / "disturbance.yaml", fitted.to_yaml(), BLOCK)
     write_study("fit", fitted.to_dict(), lambda: waterfall_figures(fitted), output)
+
+
+def _make_room(folder: Path) -> None:
+    make_folder(folder, "fit.json")
+    check_file(folder / "disturbance.yaml", BLOCK)
