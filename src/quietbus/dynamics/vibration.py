@@ -413,6 +413,22 @@ class View(eqx.Module):
 NOTHING_SEEN = View(np.zeros((0, 3)), np.zeros((0, 3, 12)))  # type: ignore[arg-type]
 
 
+def image_motions(p_BP: Float[Array, "3"]) -> Float[Array, "12 12"]:
+    """What moves images, as the columns of ``View.line_of_sight``, by xi.
+
+    Args:
+        p_BP: plate in the bus [m].
+    """
+    one, zero = jnp.eye(3), jnp.zeros((3, 3))
+    rows = [
+        [zero, zero, zero, one],
+        [zero, zero, one, zero],
+        [zero, one, zero, -one],
+        [one, zero, -one, skew(p_BP)],  # -theta_B x p_BP
+    ]
+    return jnp.block(rows)
+
+
 def linear_outputs(
     satellite: Satellite,
     small: Vibration,
@@ -431,8 +447,6 @@ def linear_outputs(
     _, damper = jax.jvp(legs.strut_force, at, (0.0 * one, one))
     turning = s * jnp.eye(3) + small.turning
     point = r_B + cross(theta_B, view.point_B)
-    r_BP = r_P - r_B - cross(theta_B, plates.p_BP)
-    moves_image = jnp.concatenate([theta_B, r_B, theta_P - theta_B, r_BP])
     return {
         "bus_rate": turning @ theta_B,
         "bus_attitude": theta_B,
@@ -440,5 +454,5 @@ def linear_outputs(
         "leg_stroke": stroke,
         "leg_force": (spring + s * damper) * stroke,
         "point_acceleration": rotate(turning @ turning, point),
-        "line_of_sight": view.line_of_sight @ moves_image,
+        "line_of_sight": view.line_of_sight @ (image_motions(plates.p_BP) @ xi),
     }

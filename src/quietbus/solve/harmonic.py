@@ -40,6 +40,7 @@ from quietbus.model.satellite import Satellite
 from quietbus.model.variants import without_disturbance, without_noise
 from quietbus.solve.direct import SLOW, Reached, Solution, Tolerances, integrate
 from quietbus.solve.noise import Broadband, noise_spectra
+from quietbus.solve.transient import Transient, transient
 from quietbus.spatial.rotation import (
     quaternion_multiply,
     quaternion_to_matrix,
@@ -52,6 +53,8 @@ LEG_ERROR = 1e-5  # [m, rad] of the plate's pose between the legs' linearisation
 INSTANTS = 128  # responses per call, so that one program serves start and run, which can be stopped
 LEG_INSTANTS = 16  # linearisations of the legs per call
 LOOKS = 8  # instants at the most at which the modes are computed
+SPEED_STEP = 0.005  # relative change of a speed after which the modes are computed anew
+MOST_BASES = 256  # instants at the most at which they are, besides
 SLOW_CHANGE = 0.05  # largest estimated error of the jitter that needs no warning
 ON_A_MODE = 1e-8  # relative distance from a mode at which the response counts as infinite
 
@@ -69,7 +72,9 @@ class Jitter:
     """
 
     amplitudes: dict[str, np.ndarray]  # (n, cmg, order, ...) by output, complex
-    change_error: np.ndarray  # (n,) estimated relative error of the assumption of slow change
+    # (n,) what is missing in the bus's rate as amplitudes change (``solve.transient``), relative
+    change_error: np.ndarray
+    missing: Transient  # the same in the outputs' units
     warnings: tuple[str, ...]
     # by gimbal motors, (n, cmg, line, ...); the phase is against line times gimbal angle
     ripple: dict[str, np.ndarray] | None = None
@@ -373,17 +378,21 @@ def respond(
     """
     along = _Along(satellite, time, states)
     amplitudes: dict[str, np.ndarray] = {}
+    poses: list[np.ndarray] = []
     ripple: list[dict[str, np.ndarray]] = []
     looked: dict[int, Vibration] = {}
     looks = np.unique(np.linspace(0, len(time) - 1, LOOKS).astype(int))
     speeds = np.asarray(rotor_speeds(satellite, states))
     speeds = np.broadcast_to(speeds, (len(time), speeds.shape[-1]))
+    bases: dict[int, Vibration] = {}
+    based = np.union1d(looks, _where_speeds_change(speeds))
     modes: dict[int, np.ndarray] = {}
     done = 0
     try:
         for start in range(0, len(time), INSTANTS):
             these = np.arange(start, min(start + INSTANTS, len(time)))
-            values, _, small = along.chunk(these, view)
+            values, xi, small = along.chunk(these, view)
+            poses.append(xi)
             for name, value in values.items():
                 whole = amplitudes.setdefault(
                     name, np.empty((len(time), *value.shape[1:]), value.dtype)
@@ -392,8 +401,10 @@ def respond(
             if satellite.motor is not None:
                 lines = ripple_lines(satellite, small, view)
                 ripple.append({name: np.asarray(v)[: len(these)] for name, v in lines.items()})
+            for base in np.intersect1d(based, these).tolist():
+                bases[base] = _instant(small, base - start)
             for look in np.intersect1d(looks, these).tolist():
-                looked[look] = _instant(small, look - start)
+                looked[look] = bases[look]
                 modes[look] = np.linalg.eigvals(looked[look].state_matrix())
             done = int(these[-1]) + 1
             if progress is not None:
@@ -408,16 +419,17 @@ def respond(
     for look, eigenvalues in modes.items():
         refuse_resonance(satellite, f"at t = {time[look]:g} s", eigenvalues, speeds[look])
     states = jax.tree.map(lambda leaf: np.asarray(leaf)[:done], states)
-    error = _change_error(
-        satellite, time[:done], amplitudes["bus_rate"], states, speeds[:done], modes
-    )
+    orders = np.asarray(orders_of(satellite.disturbance))
+    missing = transient(time[:done], np.concatenate(poses), speeds[:done], orders, bases, view)
+    total = np.sum(np.linalg.norm(amplitudes["bus_rate"], axis=3), axis=(1, 2))
+    error = missing.bus_rate / np.where(total > 0.0, total, 1.0)
     said = []
     if error.size and np.max(error) > SLOW_CHANGE:
         worst = int(np.argmax(error))
         said.append(
             f"the operating point moves fast against the damping of the nearest mode: at t = "
             f"{time[worst]:.4g} s the jitter may be wrong by {100 * error[worst]:.2g} % "
-            f"(estimated; above {100 * SLOW_CHANGE:g} % use method 'direct')"
+            f"of all lines' sum (estimated; above {100 * SLOW_CHANGE:g} % use method 'direct')"
         )
     last = modes[max(modes)]
     growing = _growing(last, 1.0 / max(float(time[-1]), 1e-9))
@@ -434,7 +446,7 @@ def respond(
                 f"{SLOW_CHANGE:g} rad use method 'direct')"
             )
     noise = _broadband(satellite, looked, modes, view)
-    return Jitter(amplitudes, error, tuple(said), ripples, noise), done
+    return Jitter(amplitudes, error, missing, tuple(said), ripples, noise), done
 
 
 def _broadband(satellite, looked, modes, view) -> Broadband | None:
@@ -599,38 +611,15 @@ def refuse_resonance(
                 )
 
 
-def _change_error(satellite, time, bus_rate, states, speeds, modes) -> np.ndarray:
-    """Estimated relative error of the jitter's quasi-steady amplitude (n,).
+def _where_speeds_change(speeds: np.ndarray) -> np.ndarray:
+    """Instants between which no rotor's speed (n, cmg) changes by much of the largest, ascending.
 
-    An amplitude that changes at the rate a lags behind by ``a / |i h Omega - lambda|``, lambda the
-    nearest eigenvalue (docs/theory.md, section 14). a is the largest of the gimbal's rate, of what
-    the amplitudes show from instant to instant, and of ``h dOmega/dt / |i h Omega - lambda|``.
-
-    Args:
-        states: of the slow motion at these times.
-        speeds: (n, cmg) of the rotors [rad/s].
+    None where speeds stay.
     """
-    size = np.linalg.norm(bus_rate, axis=3)  # (n, cmg, order)
-    rate = np.broadcast_to(np.abs(states.gimbal_rate)[:, :, None], size.shape)
-    if len(time) > 1:
-        change = np.linalg.norm(np.diff(bus_rate, axis=0), axis=3) / np.diff(time)[:, None, None]
-        change = np.maximum(np.append(change, change[-1:], 0), np.append(change[:1], change, 0))
-        rate = np.maximum(rate, change / np.maximum(size, 1e-300))
-    orders = np.asarray(orders_of(satellite.disturbance))
-    s = 1j * speeds[:, :, None] * orders
-    looks = np.array(sorted(modes))
-    nearest = np.argmin(np.abs(np.arange(len(time))[:, None] - looks), axis=1)
-    distance = np.empty(s.shape)
-    for i, look in enumerate(looks):
-        near = nearest == i
-        distance[near] = np.min(np.abs(s[near, ..., None] - modes[look]), axis=-1)
-    distance = np.maximum(distance, 1e-300)
-    if len(time) > 1:  # a line whose frequency changes passes by the mode
-        sweep = np.abs(np.gradient(speeds, time, axis=0))[:, :, None] * orders
-        rate = np.maximum(rate, sweep / distance)
-    lag = rate / distance
-    total = np.sum(size, axis=(1, 2))
-    return np.sum(lag * size, axis=(1, 2)) / np.where(total > 0.0, total, 1.0)
+    largest = np.max(np.abs(speeds)) or 1.0
+    way = np.append(0.0, np.cumsum(np.max(np.abs(np.diff(speeds, axis=0)), axis=1)))
+    step = max(SPEED_STEP * largest, way[-1] / MOST_BASES)
+    return np.unique((way / step).astype(int), return_index=True)[1]
 
 
 def _growing(eigenvalues: np.ndarray, least: float) -> str:
