@@ -22,6 +22,7 @@ from quietbus.dynamics.vibration import Vibration, View, image_motions
 
 SEGMENT = 512  # instants at the most that are followed in one go
 CHIRP = 0.1  # [rad] phase that a changing speed may turn beyond an even one's in a step
+NOTHING = 1e-9  # of the largest line: lines that are left out
 SLIGHT = 1e-5  # [rad/s] damping of all speeds, so that a free body's rest and drift are two modes
 
 
@@ -55,6 +56,9 @@ def transient(
     count, lines = len(time), xi.shape[1] * xi.shape[2]
     s = 1j * (speeds[:, :, None] * orders).reshape(count, lines)
     xi = xi.reshape(count, lines, 12)
+    sizes = np.max(np.abs(xi), axis=(0, 2))
+    some = sizes > NOTHING * np.max(sizes)
+    s, xi = s[:, some], xi[:, some]
     seen = np.asarray(view.line_of_sight)
     rate, image = np.zeros(count), np.zeros((count, len(seen)))
     y = None
