@@ -274,9 +274,15 @@ def verification_tables(numbers: Mapping[str, Any]) -> Iterator[Table | str]:
             f"{row['value']:.3g}",
             f"{row['limit']:.3g}{unit}",
             f"{row['margin_percent']:.1f} %",
-            "met" if row["met"] else "NOT MET",
+            "met" if row["met"] else "NOT MET" if row["decided"] else "UNDECIDED",
         )
         notes.append(f"{i}: {row['meaning']}; {row['from_s']:g} s to {row['until_s']:g} s")
+        if not row["decided"]:
+            notes.append(
+                f"{i}: the value may be off by {row['uncertainty']:.3g}{unit}: the jitter changes "
+                "faster than modes settle, or they still ring from a line that crossed them. Use "
+                "--method direct, or another stretch (start, end)"
+            )
     yield table
     yield from notes
 

@@ -15,7 +15,7 @@ from quietbus.analysis.chi_square import UnsoundStatisticError
 from quietbus.analysis.motion import ImageMotion, Lines, SampledSignal
 from quietbus.analysis.noise import Noise
 from quietbus.analysis.pointing import Statistic, check_stretch, contributions, evaluate
-from quietbus.analysis.windows import MOST_PERIODS, Metric
+from quietbus.analysis.windows import MOST_PERIODS, Metric, largest_change
 from quietbus.arguments import choice, count
 from quietbus.results import AXES, aliasing, scenario_of
 from quietbus.scenario import Problem, Scenario, ScenarioError
@@ -47,11 +47,22 @@ class Verdict:
     value: float  # [rad], or a plain number of MTF_loss
     limit: float
     contributions: dict[str, float]  # [rad] RMS that each alone has in the metric
+    uncertainty: float = 0.0  # [rad, or 1] as much as the value may be off while modes still ring
 
     @property
     def met(self) -> bool:
-        """Whether the value is at most the limit."""
-        return self.value <= self.limit
+        """Whether the value is at most the limit, for certain."""
+        return self.value + self.uncertainty <= self.limit
+
+    @property
+    def decided(self) -> bool:
+        """Whether the value is further from the limit than it may be off."""
+        return self.met or self.value - self.uncertainty > self.limit
+
+    @property
+    def word(self) -> str:
+        """The verdict."""
+        return "met" if self.met else "NOT MET" if self.decided else "UNDECIDED"
 
     @property
     def margin(self) -> float:
@@ -187,7 +198,20 @@ class Verification:
             value=value,
             limit=requirement.at_most,
             contributions={name: rms for name, rms in parts.items() if rms > least},
+            uncertainty=self._uncertainty(requirement.line_of_sight, metric, stretch),
         )
+
+    def _uncertainty(
+        self, line_of_sight: str, metric: Metric, stretch: tuple[float, float]
+    ) -> float:
+        """How much what the lines lack as they change may make of the metric [rad, or 1]."""
+        if "line_of_sight_change_error" not in self.run:
+            return 0.0
+        missing = self.run["line_of_sight_change_error"].sel(line=line_of_sight).to_numpy()
+        time = self.run["time"].to_numpy()
+        first = max(int(np.searchsorted(time, stretch[0], side="right")) - 1, 0)
+        last = int(np.searchsorted(time, stretch[1])) + 1
+        return largest_change(metric, float(np.max(missing[first:last])))
 
     def _judged(self, requirement: Any) -> ImageMotion:
         motion = self.motion(requirement.line_of_sight)
@@ -252,7 +276,9 @@ class Verification:
                         "limit": verdict.shown(verdict.limit),
                         "margin": verdict.shown(verdict.margin),
                         "margin_percent": verdict.margin_percent,
+                        "uncertainty": verdict.shown(verdict.uncertainty),
                         "met": verdict.met,
+                        "decided": verdict.decided,
                         "contributions_arcsec": {
                             name: ARCSEC * rms for name, rms in verdict.contributions.items()
                         },

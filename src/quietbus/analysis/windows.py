@@ -133,6 +133,24 @@ def gain(metric: Metric, frequency_hz: np.ndarray, at: np.ndarray | float = 0.0)
             raise ValueError(f"{metric.name} is not a linear metric")
 
 
+def largest_change(metric: Metric, amplitude: float) -> float:
+    """Bound on how much motion of an amplitude [rad], at whatever frequency, adds to a metric.
+
+    The gains' largest values; of ``MTF_loss`` the slopes of exp(-2 pi^2 nu^2 s^2) by jitter s and
+    of sin(x)/x, x = pi nu b, by smear b.
+    """
+    if metric.name == "MTF_loss":
+        slope = 2.0 * np.pi * np.exp(-0.5) * np.sqrt(0.5) + np.pi * STEEPEST * SMEARED
+        return float(min(1.0, metric.spatial_frequency * slope * amplitude))
+    gains = {"smear": SMEARED, "RPE": 2.0, "jitter": np.sqrt(0.5), "rms": np.sqrt(0.5)}
+    gains |= dict.fromkeys(DRIFTS, 2.0)
+    return float(gains.get(metric.name, 1.0)) * amplitude
+
+
+SMEARED = 2.62  # largest of 6 j_1
+STEEPEST = 0.437  # largest slope of sin(x)/x
+
+
 def mean_square_of_density(
     metric: Metric, frequency_hz: np.ndarray, density: np.ndarray
 ) -> np.ndarray:

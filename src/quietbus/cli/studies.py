@@ -171,6 +171,10 @@ def verify(
         for part in verification_tables(numbers):
             print(part) if isinstance(part, str) else print_table(part)
         write_study("verification", numbers, lambda: pointing_figures(verification), output)
-    missed = [f"{v.name} of {v.line_of_sight}" for v in verification.verdicts if not v.met]
+    missed = [
+        f"{v.name} of {v.line_of_sight}{'' if v.decided else ' (undecided)'}"
+        for v in verification.verdicts
+        if not v.met
+    ]
     if missed:
         fail(f"{len(missed)} of {len(verification.verdicts)} not met: {'; '.join(missed)}")

@@ -169,7 +169,7 @@ def _exposure(axes: Axes, verdict: Verdict, windows: np.ndarray, values: np.ndar
         "o" if verdict.met else "X",
         color="k",
         markersize=6,
-        label="value at the required exposure:\nmet (dot) or not met (cross)",
+        label="value at the required exposure:\nmet (dot) or not (cross)",
     )
     every = np.array([*(verdict.scale * values), value, verdict.shown(verdict.limit)])
     log_scale(axes, 0.5 * float(np.min(every[every > 0.0])), 2.0 * float(np.max(every)))
@@ -177,8 +177,7 @@ def _exposure(axes: Axes, verdict: Verdict, windows: np.ndarray, values: np.ndar
     axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
     unit = "" if verdict.unit == "1" else f" [{verdict.unit}]"
     axes.set_ylabel(f"{metric.name}{unit or ' [-]'}")
-    word = "met" if verdict.met else "NOT MET"
     name, margin = literal(verdict.line_of_sight), verdict.margin_percent
     shown = f"{value:.3g}" if verdict.unit == "1" else f"{value:.3g} {verdict.unit}"
-    said = f"{name}: {shown}, {word}, margin {margin:.3g} %"
+    said = f"{name}: {shown}, {verdict.word}, margin {margin:.3g} %"
     axes.set_title(textwrap.fill(f"{said}; {verdict.meaning}", 46), fontsize=8.5)

@@ -138,6 +138,13 @@ def _jitter_variables(frequency: np.ndarray, angle: np.ndarray, jitter: Jitter) 
             jitter.change_error, (), "1", "estimated error of the jitter by the motion's change"
         )
     }
+    if jitter.missing.line_of_sight.size:
+        data["line_of_sight_change_error"] = _variable(
+            jitter.missing.line_of_sight,
+            ("line",),
+            "rad",
+            "estimated error of a line of sight's jitter by the motion's change",
+        )
     for name, (inner, unit, meaning) in JITTER_VARIABLES.items():
         values = jitter.amplitudes[name]
         if not values.size:
