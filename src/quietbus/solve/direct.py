@@ -1,8 +1,9 @@
 """The direct solver: the nonlinear equations in time, every rotor turn resolved.
 
-Diffrax with error control, in pieces so that progress can be shown, a run can be stopped, and the
-step sequence does not depend on the output rate. The harmonic solver's slow motion is integrated
-here too, with the imbalance averaged over the rotors' turns.
+Diffrax with error control, and with steps that resolve the fastest line. In pieces, so that
+progress can be shown, a run can be stopped, and the step sequence does not depend on the output
+rate. The harmonic solver's slow motion is integrated here too, with the imbalance averaged over the
+rotors' turns.
 """
 
 from collections.abc import Callable
@@ -22,6 +23,7 @@ from quietbus.dynamics.state import State
 from quietbus.model.cmg import ClusterMoments
 from quietbus.model.satellite import Satellite
 from quietbus.model.variants import without_disturbance
+from quietbus.solve.resolved_steps import ResolvingController, fastest_line
 from quietbus.spatial.rotation import quaternion_normalize
 
 STEPS_PER_CALL = 4096  # at the most, so that a stiff run too can be watched and stopped
@@ -200,6 +202,9 @@ def _compiled_piece(satellite, state, numbers, scheme) -> _Piece:
     controller = diffrax.PIDController(
         rtol=rtol, atol=atol, pcoeff=pcoeff, icoeff=icoeff, dtmin=1e-9, force_dtmin=False
     )
+    if not scheme.averaged:
+        line = fastest_line(satellite, moments, unravel)
+        controller = ResolvingController(controller, line)
     corners = [load.profile.corners for load in satellite.loads]
     if satellite.cluster.run_up is not None:
         corners.append(satellite.cluster.run_up.corners)

@@ -23,6 +23,8 @@ from quietbus.dynamics.vibration import Vibration, View, image_motions
 SEGMENT = 512  # instants at the most that are followed in one go
 CHIRP = 0.1  # [rad] phase that a changing speed may turn beyond an even one's in a step
 NOTHING = 1e-9  # of the largest line: lines that are left out
+# modes slower than this share of a line's frequency lag behind, but ring in the slow motion alone
+SLOW_MODE = 0.01
 SLIGHT = 1e-5  # [rad/s] damping of all speeds, so that a free body's rest and drift are two modes
 
 
@@ -206,7 +208,10 @@ def _followed(
             (*by_f, *by_slope), (f[:-1], f[1:], slope[:-1], slope[1:]), strict=True
         ):
             gained += weight * values
-        factors = np.broadcast_to(turned, gained.shape)
+        middle = 0.5 * (mu[1:] + mu[:-1])
+        slow = np.abs(modes.eigenvalues) < SLOW_MODE * np.abs(middle)
+        gained = np.where(slow, np.diff(p, axis=0) / (span[:, None, None] * middle), gained)
+        factors = np.broadcast_to(np.where(slow, 0.0, turned), gained.shape)
         for now, following, factor, more in zip(z[:-1], z[1:], factors, gained, strict=True):
             np.multiply(now, factor, out=following)
             following += more
