@@ -175,10 +175,24 @@ def test_several_crossovers():
     margins = np.degrees(np.angle(-response[passes]))
     worst = np.argmin(np.abs(margins))
     assert worst != np.argmax(np.abs(margins))
-    assert result.phase_margin_deg == pytest.approx(margins[worst], abs=0.5)
+    np.testing.assert_allclose(result.phase_margins_deg, margins, atol=0.5)
+    assert not result.stable  # so that none of these is a margin
+    assert result.phase_margin_deg is None
     assert 2 * np.pi * result.crossover_hz == pytest.approx(omega[passes[worst]], abs=2e-4)
     assert 2 * np.pi * result.bandwidth_hz == pytest.approx(omega[passes[0]], abs=2e-4)
     assert result.bandwidth_hz != result.crossover_hz
+
+
+@pytest.mark.parametrize(("end", "beyond"), [(0, 0.5), (1, 2.0)])
+def test_an_unstable_loop_has_no_phase_margin(end, beyond):
+    """A reading at its crossover may say +87 degrees: there is nothing left to lose."""
+    scale = beyond * analyze_loop(paper_loop()).stable_gain_range[0][end] / 2500.0
+    loop = paper_loop(pid=PID(*(scale * k for k in (PAPER_PID.kp, PAPER_PID.ki, PAPER_PID.kd))))
+    result = analyze_loop(loop)
+    assert not result.stable
+    assert len(result.crossovers_hz) > 0
+    assert result.phase_margin_deg is None
+    assert result.delay_margin_s is None
 
 
 def test_delay_margin_with_a_phase_margin_beyond_180_degrees():
@@ -510,7 +524,7 @@ def test_map_of_designs_equals_one_by_one():
     for i in range(3):
         result = analyze_loop(paper_loop(PRINTED.coefficients(k[i], c[i]), servo_bandwidth=50.0))
         assert (found.gain_low[i], found.gain_high[i]) == result.stable_gain_range[0]
-        assert found.phase_margin_deg[i] == result.phase_margin_deg
+        np.testing.assert_equal(found.phase_margin_deg[i], result.phase_margin_deg or np.nan)
         assert found.stable[i] == result.stable
         margin = 20 * np.log10(result.stable_gain_range[0][1] / 2500.0)
         assert found.gain_margin_db[i] == pytest.approx(margin)

@@ -404,10 +404,10 @@ class LoopAnalysis:
     stable_gain_range: tuple[tuple[float, float | None], ...] = ()  # K; None: no upper end
     gain_margins_db: tuple[float, ...] = ()  # [dB] each crossing of -180 degrees, by frequency
     gain_margin_frequencies_hz: tuple[float, ...] = ()  # [Hz]
-    phase_margins_deg: tuple[float, ...] = ()  # [deg] in (-180, 180], each crossover
+    phase_margins_deg: tuple[float, ...] = ()  # [deg] in (-180, 180], read at each crossover
     crossovers_hz: tuple[float, ...] = ()  # [Hz] where abs(L) passes 1, rising
-    phase_margin_deg: float | None = None  # [deg] the one nearest to zero
-    crossover_hz: float | None = None  # [Hz] the crossover of `phase_margin_deg`
+    phase_margin_deg: float | None = None  # [deg] the one nearest to zero; None if unstable
+    crossover_hz: float | None = None  # [Hz] the crossover of the one nearest to zero
     bandwidth_hz: float | None = None  # [Hz] where abs(L) first falls below 1
     delay_margin_s: float | None = None  # [s] further delay that makes a stable loop unstable
     nyquist: Nyquist | None = None  # None: the plot passes through -1
@@ -521,7 +521,7 @@ def analyze_loop(loop: Loop) -> LoopAnalysis:
         gain_margin_frequencies_hz=tuple(c.omega * hz for c in finite),
         phase_margins_deg=tuple(margins.tolist()),
         crossovers_hz=tuple((omega_c * hz).tolist()),
-        phase_margin_deg=None if least is None else float(margins[least]),
+        phase_margin_deg=float(margins[least]) if stable and least is not None else None,
         crossover_hz=None if least is None else float(omega_c[least] * hz),
         bandwidth_hz=falling[0] * hz if falling else None,
         delay_margin_s=(
