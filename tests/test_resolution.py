@@ -61,7 +61,9 @@ def test_imbalance_alone_is_not_refused_whatever_the_output_rate():
 def test_further_lines_and_noise_add_by_closed_form():
     """A line 3 cos and a line 4 cos of other frequencies, noise of mean square 2."""
     one = combine(np.full((1, 1, 1), 3.0 + 0j), np.ones((1, 1)), np.zeros((1, 1)))
-    all_ = one.with_lines(np.array([[4.0j]])).with_noise(np.array([2.0]))
+    all_ = one.with_lines(np.array([[4.0j]]), np.array([50.0]), np.zeros(1)).with_noise(
+        np.array([2.0])
+    )
     assert all_.envelope == pytest.approx(7.0)
     assert all_.worst_case == pytest.approx(7.0)
     assert all_.rss == pytest.approx(5.0)

@@ -31,6 +31,7 @@ from quietbus.results import (
     to_dataset,
 )
 from quietbus.results.checkpoint import Checkpoint
+from quietbus.results.dataset import slow_tolerances
 from quietbus.results.size import check_space
 from quietbus.results.task import Task
 from quietbus.scenario import LineOfSight, Problem, Scenario, ScenarioError, load_scenario
@@ -540,6 +541,7 @@ def _harmonic(
         scenario.simulation.output_rate,
         steady=scenario.initial.steady,
         view=task.view(),
+        tolerances=slow_tolerances(scenario),
         progress=progress,
         keep=keeping.keep,
         start=keeping.start,

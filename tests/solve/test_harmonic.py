@@ -237,6 +237,18 @@ def test_fast_change_beside_a_mode_is_warned_of():
     assert np.max(run["jitter_change_error"]) > 0.05
 
 
+def test_the_slow_motion_keeps_to_the_scenarios_tolerances():
+    """Tighter ones take more steps and are recorded; the default is coarser than a direct run's."""
+    scenario = qb.load_scenario("zhang2012").with_overrides({"simulation.duration": 2.0})
+    tight = {"simulation.tolerances": {"relative": 1e-11, "absolute": 1e-13}}
+    runs = [
+        qb.simulate(each, method="harmonic") for each in (scenario, scenario.with_overrides(tight))
+    ]
+    given = [(run.attrs["relative_tolerance"], run.attrs["absolute_tolerance"]) for run in runs]
+    assert given == [(1e-7, 1e-9), (1e-11, 1e-13)]
+    assert runs[1].attrs["steps"] > 2 * runs[0].attrs["steps"]
+
+
 def test_ctrl_c_keeps_the_jitter_known_so_far():
     def stop(t):
         if t > 30.0:  # the slow motion is reported as half of the way, then the jitter

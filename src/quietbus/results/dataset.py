@@ -23,7 +23,7 @@ from quietbus.results.schema import (
     per_hertz,
 )
 from quietbus.scenario import Scenario
-from quietbus.solve.direct import SLOW, Scheme, Solution
+from quietbus.solve.direct import SLOW, Scheme, Solution, Tolerances
 from quietbus.solve.harmonic import TOLERANCES, HarmonicSolution, Jitter
 
 
@@ -44,7 +44,7 @@ def to_dataset(
     jitter = solution.jitter if isinstance(solution, HarmonicSolution) else None
     tolerances: Any = scenario.simulation.tolerances
     if isinstance(solution, HarmonicSolution):
-        solution, tolerances = solution.slow, TOLERANCES
+        solution, tolerances = solution.slow, slow_tolerances(scenario)
     data = {
         name: _variable(getattr(solution.outputs, name), *VARIABLES[name]) for name in VARIABLES
     }
@@ -60,7 +60,7 @@ def to_dataset(
             for name, description in JOINT_VARIABLES.items()
         }
     if jitter is not None:
-        data |= _jitter_variables(*_rotor_lines(scenario, solution.outputs), jitter)
+        data |= _jitter_variables(scenario, solution, jitter)
     counted = {"cmg": solution.outputs.gimbal_angle, "leg": solution.outputs.leg_stroke}
     coordinates = {
         "time": ("time", solution.time, {"units": "s", "long_name": "time"}),
@@ -123,6 +123,14 @@ def to_dataset(
     return xr.Dataset(data, coordinates, attributes)
 
 
+def slow_tolerances(scenario: Scenario) -> Tolerances:
+    """Of a harmonic run's slow motion: the scenario's, or coarser ones where it has the default."""
+    given = scenario.simulation.tolerances
+    if given == type(given)():
+        return TOLERANCES
+    return Tolerances(given.relative, given.absolute)
+
+
 def _rotor_lines(scenario: Scenario, outputs: Outputs) -> tuple[np.ndarray, np.ndarray]:
     """Frequency and phase of each order (..., cmg, order), over time where speeds change."""
     (speed, phase), orders = rotors(scenario), np.array(scenario.cluster.orders)
@@ -131,8 +139,9 @@ def _rotor_lines(scenario: Scenario, outputs: Outputs) -> tuple[np.ndarray, np.n
     return speed[..., None] * orders, phase[..., None] * orders
 
 
-def _jitter_variables(frequency: np.ndarray, angle: np.ndarray, jitter: Jitter) -> dict[str, Any]:
+def _jitter_variables(scenario: Scenario, solution: Solution, jitter: Jitter) -> dict[str, Any]:
     """Amplitudes, phases and what combines them, of every output that has components."""
+    frequency, angle = _rotor_lines(scenario, solution.outputs)
     data = {
         "jitter_change_error": _variable(
             jitter.change_error, (), "1", "estimated error of the jitter by the motion's change"
@@ -158,11 +167,14 @@ def _jitter_variables(frequency: np.ndarray, angle: np.ndarray, jitter: Jitter) 
             np.angle(values), dimensions, "rad", f"{of}: phase against order times rotor angle"
         )
         flat = values.reshape(*values.shape[:3], -1)
-        combined = combine(flat, frequency, angle)
+        combined = combine(flat, frequency, angle, solution.time)
         if jitter.ripple is not None:
             lines = jitter.ripple[name]
             data |= _ripple_variables(name, lines, inner, unit, of)
-            combined = combined.with_lines(lines.reshape(len(lines), -1, flat.shape[-1]))
+            combined = combined.with_lines(
+                lines.reshape(len(lines), -1, flat.shape[-1]),
+                *_turning_gimbals(scenario, solution.outputs),
+            )
         if jitter.broadband is not None:
             psd = jitter.broadband.psd[name]
             data[f"{name}_psd"] = (
@@ -189,6 +201,14 @@ def _jitter_variables(frequency: np.ndarray, angle: np.ndarray, jitter: Jitter) 
             },
         )
     return data
+
+
+def _turning_gimbals(scenario: Scenario, outputs: Outputs) -> tuple[np.ndarray, np.ndarray]:
+    """Frequency [rad/s] and phase [rad] of each line (n, line) of the gimbal motors."""
+    multiples = np.array(_ripple_lines(scenario))
+    gimbals = (np.asarray(outputs.gimbal_rate), np.asarray(outputs.gimbal_angle))
+    rate, angle = ((values[..., None] * multiples).reshape(len(values), -1) for values in gimbals)
+    return rate, angle
 
 
 def _ripple_variables(

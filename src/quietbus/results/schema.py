@@ -79,7 +79,7 @@ COMBINED = {
     "envelope": "largest value as lines beat, phases as given",
     "worst_case": "sum of all amplitudes, any phases",
     "rss": "root of the sum of squares of all amplitudes",
-    "rms": "root mean square in time, phases as given",
+    "rms": "root mean square over the second about the instant, phases as given",
 }
 
 

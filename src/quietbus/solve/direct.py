@@ -199,7 +199,7 @@ def _compiled_piece(satellite, state, numbers, scheme) -> _Piece:
     # the slow motion's steps are as long as the solver's stability lets them be: a steadier
     # controller wastes fewer there
     pcoeff, icoeff = (0.2, 0.3) if scheme.averaged else (0.0, 1.0)
-    controller = diffrax.PIDController(
+    controller: diffrax.AbstractAdaptiveStepSizeController = diffrax.PIDController(
         rtol=rtol, atol=atol, pcoeff=pcoeff, icoeff=icoeff, dtmin=1e-9, force_dtmin=False
     )
     if not scheme.averaged:

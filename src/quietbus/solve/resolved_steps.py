@@ -5,6 +5,7 @@ see: its steps then may be longer than a rotor's turn, and the line comes out wr
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import diffrax
 import equinox as eqx
@@ -81,21 +82,16 @@ class ResolvingController(diffrax.AbstractAdaptiveStepSizeController):
 
     controller: diffrax.AbstractAdaptiveStepSizeController
     line: FastestLine
+    rtol: Any  # these three as of the controller within
+    atol: Any
+    norm: Callable[[Any], Any]
 
-    @property
-    def rtol(self):
-        """As of the controller within."""
-        return self.controller.rtol
-
-    @property
-    def atol(self):
-        """As of the controller within."""
-        return self.controller.atol
-
-    @property
-    def norm(self):
-        """As of the controller within."""
-        return self.controller.norm
+    def __init__(
+        self, controller: diffrax.AbstractAdaptiveStepSizeController, line: FastestLine
+    ) -> None:
+        """A controller whose steps are to be cut, and what by."""
+        self.controller, self.line = controller, line
+        self.rtol, self.atol, self.norm = controller.rtol, controller.atol, controller.norm
 
     def wrap(self, direction):
         """As diffrax asks for it; time runs forward here."""
