@@ -144,7 +144,10 @@ def _jitter_variables(scenario: Scenario, solution: Solution, jitter: Jitter) ->
     frequency, angle = _rotor_lines(scenario, solution.outputs)
     data = {
         "jitter_change_error": _variable(
-            jitter.change_error, (), "1", "estimated error of the jitter by the motion's change"
+            jitter.change_error,
+            (),
+            "1",
+            "estimated error of the jitter, by change and by second order",
         )
     }
     if jitter.missing.line_of_sight.size:
@@ -152,7 +155,7 @@ def _jitter_variables(scenario: Scenario, solution: Solution, jitter: Jitter) ->
             jitter.missing.line_of_sight,
             ("line",),
             "rad",
-            "estimated error of a line of sight's jitter by the motion's change",
+            "estimated error of a line of sight's jitter, by change and by second order",
         )
     for name, (inner, unit, meaning) in JITTER_VARIABLES.items():
         values = jitter.amplitudes[name]

@@ -93,6 +93,8 @@ def described(name: str) -> tuple[tuple[str, ...], str] | None:
         return ("axis",), "rad/s"
     if name == "jitter_change_error":
         return ("time",), "1"
+    if name == "line_of_sight_change_error":
+        return ("time", "line"), "rad"
     if name == "line_of_sight_cospectrum":
         return ("look", "frequency", "cmg", "line", "pair"), per_hertz("rad")
     for of, (inner, unit, _) in JITTER_VARIABLES.items():

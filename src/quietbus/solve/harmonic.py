@@ -72,7 +72,8 @@ class Jitter:
     """
 
     amplitudes: dict[str, np.ndarray]  # (n, cmg, order, ...) by output, complex
-    # (n,) what is missing in the bus's rate as amplitudes change (``solve.transient``), relative
+    # (n,) what is missing in the bus's rate, as amplitudes change (``solve.transient``) and by
+    # second order, over the sum of its lines
     change_error: np.ndarray
     missing: Transient  # the same in the outputs' units
     warnings: tuple[str, ...]
@@ -421,14 +422,20 @@ def respond(
     states = jax.tree.map(lambda leaf: np.asarray(leaf)[:done], states)
     orders = np.asarray(orders_of(satellite.disturbance))
     missing = transient(time[:done], np.concatenate(poses), speeds[:done], orders, bases, view)
-    total = np.sum(np.linalg.norm(amplitudes["bus_rate"], axis=3), axis=(1, 2))
+    second = _second_order(satellite, amplitudes)
+    missing = Transient(
+        missing.bus_rate + second * _total(amplitudes["bus_rate"]),
+        missing.line_of_sight + second[:, None] * _total(amplitudes["line_of_sight"]),
+    )
+    total = _total(amplitudes["bus_rate"])
     error = missing.bus_rate / np.where(total > 0.0, total, 1.0)
     said = []
     if error.size and np.max(error) > SLOW_CHANGE:
         worst = int(np.argmax(error))
         said.append(
-            f"the operating point moves fast against the damping of the nearest mode: at t = "
-            f"{time[worst]:.4g} s the jitter may be wrong by {100 * error[worst]:.2g} % "
+            f"the operating point moves fast against the damping of the nearest mode, or a mode "
+            f"still rings: at t = {time[worst]:.4g} s the jitter may be wrong by "
+            f"{100 * error[worst]:.2g} % "
             f"of all lines' sum (estimated; above {100 * SLOW_CHANGE:g} % use method 'direct')"
         )
     last = modes[max(modes)]
@@ -609,6 +616,22 @@ def refuse_resonance(
                     f"undamped mode of the satellite {where}: the steady jitter would be "
                     "infinite. Give the struts damping, or change the rotor's speed"
                 )
+
+
+def _total(amplitudes: np.ndarray) -> np.ndarray:
+    """Lengths of vectors (n, cmg, order, ..., axis), summed over all lines."""
+    return np.sum(np.linalg.norm(amplitudes, axis=-1), axis=(1, 2))
+
+
+def _second_order(satellite: Satellite, amplitudes: dict[str, np.ndarray]) -> np.ndarray:
+    """Share (n,) of the jitter that what is of second order in it may have.
+
+    As much as the jitter changes the geometry that its equations are linear about: strokes over
+    the legs' lengths, and turns.
+    """
+    stroke = np.sum(np.abs(amplitudes["leg_stroke"]), axis=(1, 2))
+    turn = _total(amplitudes["bus_attitude"])
+    return np.max(stroke / np.asarray(satellite.legs.nominal_length), axis=1) + turn
 
 
 def _where_speeds_change(speeds: np.ndarray) -> np.ndarray:
