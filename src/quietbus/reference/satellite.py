@@ -92,7 +92,7 @@ class ReferenceSatellite:
         )
 
     def fly(
-        self, start: Motion, times: np.ndarray, relative: float = 1e-10, absolute: float = 1e-13
+        self, start: Motion, times: np.ndarray, relative: float = 1e-11, absolute: float = 1e-13
     ) -> list[Motion]:
         """Motions at ascending times [s], the first that of ``start``.
 
