@@ -50,7 +50,7 @@ def test_what_the_papers_leg_spin_misses(slew, legs):
     spin = rate / np.sqrt(1.0 - kappa[0] ** 2)
     assert_says(
         THEORY,
-        r"($|\kappa| = #$, # °/s, axial inertia $#$ kg m² per leg)",
+        r"($|\kappa| = #$, # deg/s, axial inertia $#$ kg m² per leg)",
         kappa[0],
         np.degrees(rate),
         axial,

@@ -251,7 +251,7 @@ def gain_by_height(study: Study) -> Figure:
     axes.set_ylabel("K [N m s/rad]")
     axes.set_title(
         "A torque on the plate also swings it sideways. This swing's force turns the bus too:\n"
-        "against the torque, if the platform is above the bus mass centre (docs/analysis.md)"
+        "against the torque, if the platform is above the bus mass centre"
     )
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure

@@ -40,6 +40,7 @@ from quietbus.solve.harmonic import SLOW_CHANGE
 
 TIME = "time [s]"
 RPM = 30.0 / np.pi  # of a rad/s
+START = 0.2  # of a run: what settles within it is shown enlarged too
 # of a harmonic run's jitter: (what it is called, its line)
 COMBINED: dict[str, tuple[str, dict[str, Any]]] = {
     "envelope": ("envelope, phases as given", {"linewidth": 1.8}),
@@ -229,8 +230,9 @@ def struts(run: xr.Dataset) -> Figure:
         ],
         "leg",
     )
-    if figure.axes[1].collections:
-        figure.axes[1].set_title("bands: vibration, peak to peak")
+    lower = figure.axes[len(figure.axes) // 2]
+    if lower.collections:
+        lower.set_title("bands: vibration, peak to peak")
     return figure
 
 
@@ -301,9 +303,9 @@ def finish_spectrum(panels: Sequence[Axes], run: xr.Dataset) -> None:
 
 
 def _mark_rotors(axes: Axes, run: xr.Dataset, limits: tuple[float, float]) -> None:
-    """Bands at the rotors' frequencies and their multiples, a marker on the peak of each line."""
+    """Bands at the rotors' frequencies and those multiples that show, a marker on each peak."""
     slowest, fastest = rotor_frequencies(run)
-    lines = list(axes.lines)
+    lines, floor = list(axes.lines), axes.get_ylim()[0]
     speeds = f"{slowest:.4g}" if np.isclose(slowest, fastest) else f"{slowest:.4g}–{fastest:.4g}"
     reached = limits[0]
     for order in range(1, 5):
@@ -311,6 +313,17 @@ def _mark_rotors(axes: Axes, run: xr.Dataset, limits: tuple[float, float]) -> No
         if not reached < start <= end < limits[1]:  # bands that overlap tell nothing
             break
         reached = end
+        peaks = []
+        for line, marker in zip(lines, MARKERS, strict=False):
+            x, y = np.array(line.get_data())
+            near = np.flatnonzero((x > 0.98 * start) & (x < 1.02 * end))
+            top = near[np.argmax(y[near])] if near.size else 0
+            if near.size and y[top] > floor:
+                peaks.append((x[top], y[top], marker, line.get_color()))
+        if order > 1 and not peaks:
+            continue
+        for x_top, y_top, marker, colour in peaks:
+            axes.plot(x_top, y_top, marker, color=colour, markersize=5)
         axes.axvspan(start, end, facecolor="0.94", edgecolor="0.7", linewidth=0.8, zorder=0)
         first = order == 1
         axes.annotate(
@@ -324,22 +337,37 @@ def _mark_rotors(axes: Axes, run: xr.Dataset, limits: tuple[float, float]) -> No
             fontsize=8,
             color="0.3",
         )
-        for line, marker in zip(lines, MARKERS, strict=False):
-            x, y = np.array(line.get_data())
-            near = np.flatnonzero((x > 0.98 * start) & (x < 1.02 * end))
-            if near.size:
-                top = near[np.argmax(y[near])]
-                axes.plot(x[top], y[top], marker, color=line.get_color(), markersize=5)
 
 
 def _two_rows(run: xr.Dataset, title: str, rows: list[tuple[np.ndarray, str]], what: str) -> Figure:
-    """Two pictures above each other, a line for each CMG or leg."""
+    """Two pictures above each other, a line for each CMG or leg; beside them the start, enlarged.
+
+    The enlargement is there where all happens in the first part of a long run.
+    """
+    time = run["time"].to_numpy()
+    start = max(_settled(time, values) for values, _ in rows)
+    spans = [len(time)] if start > START * len(time) else [len(time), start]
     figure = new_figure(4.8, title)
-    panels = figure.subplots(2, 1, sharex=True)
-    for axes, (values, label) in zip(panels, rows, strict=True):
+    panels = figure.subplots(2, len(spans), sharex="col", squeeze=False)
+    for row, (values, label) in zip(panels, rows, strict=True):
         names = [f"{what} {number}" for number in range(values.shape[1])]
-        draw_lines(axes, run["time"].to_numpy(), values, names)
-        axes.set_ylabel(label)
-    panels[-1].set_xlabel(TIME)
-    share_legend(figure, panels[0])
+        for axes, span in zip(row, spans, strict=True):
+            draw_lines(axes, time[:span], values[:span], names)
+        row[0].set_ylabel(label)
+    for axes in panels[-1]:
+        axes.set_xlabel(TIME)
+    if len(spans) > 1:
+        panels[0, 1].set_title(f"the first {time[start - 1] - time[0]:.2g} s")
+    share_legend(figure, panels[0, 0])
     return figure
+
+
+def _settled(time: np.ndarray, values: np.ndarray) -> int:
+    """Samples until lines (n, line) have less than a tenth of their largest swing left."""
+    if len(time) < 8:
+        return len(time)
+    end = values[-len(time) // 4 :].mean(axis=0)
+    away = np.abs(values - end)
+    moving = np.flatnonzero(np.any(away > 0.1 * np.max(away, axis=0), axis=1))
+    last = int(moving[-1]) if moving.size else 0
+    return min(len(time), max(2 * last, 8))

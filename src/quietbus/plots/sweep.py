@@ -9,6 +9,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
+from quietbus.analysis.run_up import TURNS
 from quietbus.plots.signals import AXES, LINES, NOISE
 from quietbus.plots.style import COLOURS, DASHES, explain, new_figure, scaled, share_legend, style
 
@@ -264,6 +265,7 @@ def run_up_figure(runs: Mapping[str, RunUp], name: str) -> Figure:
                 label="map of constant speeds",
             )
             axes.set_ylabel(f"about {AXES[i]}\n[{unit}]")
+        panels[0].set_title(f"from the middle of the first {TURNS:g} turns, over which is averaged")
         panels[-1].set_xlabel("rotor speed [rpm]")
         share_legend(figure, panels[0])
     return figure

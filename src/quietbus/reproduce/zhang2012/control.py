@@ -197,7 +197,7 @@ def bode(bench: Bench) -> Findings:
     )
     gain.set(xscale="log", ylabel="gain [dB]", xlim=(1e-5, 50.0))
     phase.set(
-        ylabel="phase [°]", xlabel="frequency [Hz]", yticks=range(-270, 0, 90), ylim=(-290, -40)
+        ylabel="phase [deg]", xlabel="frequency [Hz]", yticks=range(-270, 0, 90), ylim=(-290, -40)
     )
     above = min(margin for margin in margins if margin > 0.0)
     below = max(margin for margin in margins if margin < 0.0)

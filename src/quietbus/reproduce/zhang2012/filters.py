@@ -57,7 +57,7 @@ def filters(bench: Bench) -> Findings:
             axes.plot(60.0 * hz, size, color=COLOURS[colour], linestyle=dashes, label=label)
         axes.set(xscale="log", yscale="log", xlabel="rotor speed [rpm]")
         axes.set_title(f"about {'xyz'[axis]}")
-    over_speed[0].set_ylabel("bus rate, RSS [10⁻⁶ °/s]")
+    over_speed[0].set_ylabel("bus rate, RSS [10⁻⁶ deg/s]")
     share_legend(figure, over_speed[0])
 
     bench.shop.tell("filters over the platform's design", 0.5)

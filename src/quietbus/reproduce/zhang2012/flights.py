@@ -31,8 +31,8 @@ def stabilisation(bench: Bench) -> Findings:
         "Figure 9a and b of the paper: left the rates, which all but coincide (the same angle on "
         "each axis), right the jitter about the slow motion, "
         "largest value in each second by the direct solver (marks) and by the harmonic solver "
-        f"(lines). At the end {numbers['residual_rigid']:.2g} °/s without and "
-        f"{numbers['residual_isolated']:.2g} °/s with the platform on the worst axis, "
+        f"(lines). At the end {numbers['residual_rigid']:.2g} deg/s without and "
+        f"{numbers['residual_isolated']:.2g} deg/s with the platform on the worst axis, "
         f"{numbers['ratio']:.2g} %; the two solvers differ by at most "
         f"{100 * numbers['solver_difference']:.1g} % there. {ASSUMED}."
     )
@@ -81,14 +81,14 @@ def slew_angles(bench: Bench) -> Findings:
     draw_lines(axes, time, angles, ("roll", "pitch", "yaw"))
     for target in (60.0, 30.0, -60.0):
         axes.axhline(target, color="0.6", linewidth=0.8, zorder=0)
-    axes.set(xlabel="time [s]", ylabel="attitude angle [°]")
+    axes.set(xlabel="time [s]", ylabel="attitude angle [deg]")
     share_legend(figure, axes)
     error = np.degrees(np.linalg.norm(run["attitude_error"].to_numpy()[-1]))
     numbers = {f"slew_{name}": float(angles[-1, i]) for i, name in enumerate(("x", "y", "z"))}
     caption = (
         "Figure 10 of the paper: yaw-pitch-roll angles. At the end the error is "
         f"{3600 * error:.2g} arcsec. The paper states no guidance; assumed is a smooth turn about "
-        "one axis of 1.5 °/s at most, so the curves' course is ours, their ends are the paper's."
+        "one axis of 1.5 deg/s at most, so the curves' course is ours, their ends are the paper's."
     )
     return Findings(figure, caption, numbers)
 
@@ -99,9 +99,10 @@ def slew_rates(bench: Bench) -> Findings:
     figure, found = _rates(bench, "zhang2012-slew", title)
     caption = (
         "Figure 11a and b of the paper, drawn as figure 9. At the end "
-        f"{found['residual_rigid']:.2g} °/s without and {found['residual_isolated']:.2g} °/s with "
-        f"the platform on the worst axis, {found['ratio']:.2g} %; the two solvers differ by at "
-        f"most {100 * found['solver_difference']:.1g} % there. {ASSUMED}; guidance as in figure 10."
+        f"{found['residual_rigid']:.2g} deg/s without and {found['residual_isolated']:.2g} deg/s "
+        f"with the platform on the worst axis, {found['ratio']:.2g} %; the two solvers differ by "
+        f"at most {100 * found['solver_difference']:.1g} % there. {ASSUMED}; guidance as in figure "
+        f"10."
     )
     return Findings(figure, caption, {f"slew_{name}": value for name, value in found.items()})
 
@@ -113,12 +114,12 @@ def slew_gimbals(bench: Bench) -> Findings:
     figure = new_figure(3.4, "Gimbal angles with the platform, slew to (60, 30, -60)°")
     axes = figure.subplots()
     draw_lines(axes, time, angles, [f"CMG {j}" for j in range(angles.shape[1])])
-    axes.set(xlabel="time [s]", ylabel="gimbal angle [°]")
+    axes.set(xlabel="time [s]", ylabel="gimbal angle [deg]")
     share_legend(figure, axes)
     least = float(run["singularity_measure"].min())
     rate = float(np.max(np.abs(np.gradient(angles, time, axis=0))))
     caption = (
-        f"Figure 12 of the paper. Largest gimbal rate {rate:.3g} °/s; the singularity measure "
+        f"Figure 12 of the paper. Largest gimbal rate {rate:.3g} deg/s; the singularity measure "
         f"sqrt(det(A Aᵀ)) stays above {least:.3g}, so the cluster is never near a singular state."
     )
     return Findings(figure, caption, {"slew_singularity": least, "slew_gimbal_rate": rate})
@@ -140,8 +141,8 @@ def _rates(bench: Bench, name: str, title: str) -> tuple[Figure, dict[str, float
         seconds, peaks = jitter_of_flight(run, envelope)
         _jitter(row[1], seconds, peaks, envelope)
         row[1].set_title("jitter about the slow motion")
-        row[0].set(title=TITLES[mount], ylabel="bus rate [°/s]")
-        row[1].set(yscale="log", ylabel="peak in each second [°/s]", ylim=(1e-7, 3e-3))
+        row[0].set(title=TITLES[mount], ylabel="bus rate [deg/s]")
+        row[1].set(yscale="log", ylabel="peak in each second [deg/s]", ylim=(1e-7, 3e-3))
         row[1].annotate(
             "first second: start-up,\nnot jitter",
             (seconds[0], float(np.degrees(peaks[0].max()))),

@@ -46,7 +46,7 @@ def universal_joint(bench: Bench) -> Findings:
             "label": f"leg {i}",
         }
         draw_line(spin, time, np.degrees(missing[:, i]), **look)
-    spin.set_ylabel("leg's spin that\nthe paper misses [°/s]")
+    spin.set_ylabel("leg's spin that\nthe paper misses [deg/s]")
     momentum.plot(time, np.linalg.norm(momentum_B, axis=1), color=COLOURS[0])
     momentum.set(xlabel="time [s]", ylabel="angular momentum\nthat is missing [N m s]")
     share_legend(figure, spin)
@@ -67,11 +67,11 @@ def universal_joint(bench: Bench) -> Findings:
         "Eq. 12 has ω_s = -(ω·h)/(s·h): no turn of the leg about h, seen from inertial space. A "
         "universal joint holds the leg *relative to its base*, (ω_l - ω_b)·h = 0. On the slewing "
         f"satellite the paper's legs turn in their joints about h by up to "
-        f"{np.degrees(numbers['joint_violation_paper']):.2g} °/s, ours by "
-        f"{np.degrees(numbers['joint_violation']):.0e} °/s."
+        f"{np.degrees(numbers['joint_violation_paper']):.2g} deg/s, ours by "
+        f"{np.degrees(numbers['joint_violation']):.0e} deg/s."
     )
     caption = (
-        f"Up to {held:.2g} °/s of each leg's spin and {norm.max():.1e} N m s of angular momentum "
+        f"Up to {held:.2g} deg/s of each leg's spin and {norm.max():.1e} N m s of angular momentum "
         f"go missing, {numbers['joint_momentum_relative']:.1e} of the bus's {whole:.3g} N m s "
         f"in the slew; the false moment is up to {numbers['joint_moment_error']:.1e} N m. The legs "
         "are light, so the paper's curves do not show it; a check of conserved momentum does, and "

@@ -62,7 +62,7 @@ def per_cmg(bench: Bench) -> Findings:
         }
         speed.plot(60.0 * SWEEP_HZ, size, markevery=[-1], label=label, **look)
     speed.set(xscale="log", yscale="log", xlabel="rotor speed [rpm]")
-    speed.set_ylabel("bus rate, worst phases [10⁻⁶ °/s]")
+    speed.set_ylabel("bus rate, worst phases [10⁻⁶ deg/s]")
     sizes = [
         s.combined(m).worst_case for s, m in ((one, "rigid"), (one, "isolated"), (four, "isolated"))
     ]
@@ -72,7 +72,11 @@ def per_cmg(bench: Bench) -> Findings:
     dots.set_xticks(range(3), "xyz")
     share_legend(figure, speed)
     own = _figures(one)
-    titles = ("bus rate, norm\n[10⁻⁶ °/s]", "upper limit of K\n[N m s/rad]", "stroke [mm per N m]")
+    titles = (
+        "bus rate, norm\n[10⁻⁶ deg/s]",
+        "upper limit of K\n[N m s/rad]",
+        "stroke [mm per N m]",
+    )
     for k, title in enumerate(titles):
         axes = figure.add_subplot(grid[1, 2 * k : 2 * k + 2])
         axes.axhline(own[k], color=COLOURS[1], linestyle=DASHES[1])
