@@ -124,6 +124,7 @@ def test_init_writes_a_scenario_that_works_and_keeps_what_is_there(command, tmp_
         (["compare", "zhang2012", "-o", "/proc"], "/proc: cannot be written"),
         (["plot", "nothing.nc"], "nothing.nc: no such file"),
         (["plot", "."], ".: is a folder"),
+        (["plot", "zhang2013"], "did you mean zhang2012"),
         (["plot", "nothing.nc", "--format", "bmp"], "expected png, svg or pdf, got 'bmp'"),
         (["validate", "zhang2012", "--export", "no/folder/m.xml"], "no/folder: no such folder"),
     ],

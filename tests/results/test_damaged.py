@@ -9,7 +9,7 @@ import pytest
 
 import quietbus as qb
 from quietbus.plots import run_figures
-from quietbus.results.checks import HEAP
+from quietbus.results.checks import HEAP, TEXTS
 from quietbus.results.files import SEAL
 from quietbus.results.schema import VARIABLES
 from results.synthetic import synthetic
@@ -215,7 +215,7 @@ HARMS = {
     "a group": (instead("bus_rate", group), "harmed.nc: "),
     "a folder": (lambda p: (p.unlink(), p.mkdir()), "is a folder; expected the file of a run"),
     "a pipe": (lambda p: (p.unlink(), os.mkfifo(p)), "is a pipe, socket or device"),
-    "empty": (lambda p: p.write_bytes(b""), "not a NetCDF-4 file"),
+    "empty": (lambda p: p.write_bytes(b""), "not a NetCDF-4 file (expected a run"),
 } | {
     f"no {name}": (instead(name, lambda *_: None), f"not a run of quietbus: it has no {name}")
     for name in VARIABLES
@@ -245,6 +245,7 @@ def test_what_users_do_to_runs_stays_a_run(good, tmp_path):
         run.isel(time=slice(None, None, 3)),
         run.assign(mine=("time", np.zeros(60))).assign_attrs(remark="mine"),
         run.astype(np.float32),
+        run.drop_attrs(deep=False).assign_attrs({name: run.attrs[name] for name in TEXTS}),
     ):
         qb.save_run(kept, tmp_path / "kept.nc")
         assert qb.load_run(tmp_path / "kept.nc").equals(kept)

@@ -47,15 +47,15 @@ HOSTILE = {
             "  gimbal_motor: {stepping: {steps_per_turn: 200, frequency: 20, damping: 0.3, "
             "harmonics: 1000000000}}\n  rotor_phases",
         ),
-        "harmonics (line 81): expected a count of at most 1,000",
+        "harmonics (line 82): expected a count of at most 1,000",
     ),
     "list as a metric": (
         TEXT + LINES + "requirements: [{metric: [1], line_of_sight: c, at_most: 1}]\n",
-        "requirements[0].metric (line 119): expected one of",
+        "requirements[0].metric (line 120): expected one of",
     ),
     "mapping as a metric": (
         TEXT + LINES + "requirements: [{metric: {a: 1}, line_of_sight: c, at_most: 1}]\n",
-        "requirements[0].metric (line 119): expected one of",
+        "requirements[0].metric (line 120): expected one of",
     ),
     "escape letters": (TEXT.replace(": zhang2012", ': "\\e]0;x\\a"'), r"got '\x1b]0;x\x07'"),
     "null letter": (TEXT.replace(": zhang2012", ': "a\\0b"'), r"got 'a\x00b' (control"),

@@ -87,6 +87,7 @@ MISTAKES = [
     ("axial_inertia: 1.0e-4}", "axial_inertia: 1}", "isolator.legs.upper_part.axial_inertia (line {}): expected at most twice the transverse inertia, as every body has it, got 1 kg*m^2"),
     ("inertia: [0.06, 0.06, 0.06]", "inertia: [0.06, 0.06, 0.13]", "cluster.gimbal_body.inertia (line {}): expected the principal inertia of a rigid body, but its principal moments 0.06, 0.06, 0.13 kg m^2 break the triangle inequality"),
     ("transverse_inertia: 0.0143239448782706", "transverse_inertia: 0.0119", "cluster.rotor.transverse_inertia (line {}): expected, with the spin inertia 0.0238732 kg*m^2"),
+    ("dynamic_imbalance: 17 g*cm^2", "dynamic_imbalance: 17", "cluster.rotor.dynamic_imbalance (line {}): expected, with the spin inertia 0.0238732 kg*m^2, the transverse inertia 0.0143239 kg*m^2 and the dynamic imbalance 17 kg*m^2 (1.7e+08 g*cm^2), the inertia of a rigid body"),
     # rotors
     ("momentum: 15 N*m*s", "momentum: -15 N*m*s", "cluster.rotor.momentum (line {}): expected a momentum with the sign of the speed (628.319 rad/s), got -15 N*m*s"),
     ("speed: 6000 rpm", "speed: 0", "cluster.rotor.speed (line {}): expected a speed other than 0: a rotor at rest is described by spin_inertia instead of momentum"),
@@ -101,6 +102,31 @@ def test_mistake_is_told_with_file_line_and_field(right, wrong, message):
     line = 1 + TEXT[: TEXT.index(right)].count("\n")
     told = refusal(TEXT.replace(right, wrong, 1)).splitlines()
     assert any(each.startswith("s.yaml: " + message.format(line)) for each in told), told
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "path"),
+    [
+        ("bus:  ", "Bus:  ", "Bus"),
+        ("bus:  ", "BUS:  ", "BUS"),
+        ("stiffness: 20 kN/m", "stifness: 20 kN/m", "isolator.legs.stifness"),
+        ("skew:", "skev:", "cluster.pyramid.skev"),
+    ],
+)
+def test_misspelt_key_is_told_once(right, wrong, path):
+    told = refusal(TEXT.replace(right, wrong, 1)).splitlines()
+    assert len(told) == 1, told
+    assert re.match(rf"s\.yaml: {path} \(line \d+\): unknown key '\w+'; did you mean", told[0])
+
+
+def test_missing_key_beside_a_misspelt_one_is_told_too():
+    told = refusal(
+        TEXT.replace("stiffness: 20 kN/m", "stifness: 20 kN/m").replace(
+            "    damping: 500 N*s/m", ""
+        )
+    )
+    assert "isolator.legs.damping (line" in told
+    assert len(told.splitlines()) == 2
 
 
 @pytest.mark.parametrize("part", ["name", "bus", "isolator", "cluster"])

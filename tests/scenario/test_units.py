@@ -99,6 +99,10 @@ def test_quantity_in_si(quantity, text, value):
             "expected a joint friction in N*m*s/rad, got '5 Nms' "
             "(unknown unit 'Nms'; products are written with *, as in N*m)",
         ),
+        (DAMPING, "5 Ns/m", "unknown unit 'Ns'; products are written with *, as in N*m"),
+        (FRICTION, "5 N.m.s", "'N.m.s' is not a unit; products are written with *: N*m*s"),
+        (SPEED, "6000 r/min", "unknown unit 'r'; turns are rev, as in rev/min, which is rpm"),
+        (SPEED, "6000 U/min", "unknown unit 'U'; turns are rev, as in rev/min, which is rpm"),
         (LENGTH, "20 degC", "got '20 degC' (unknown unit 'degC'"),
         (LENGTH, "5 kg**1e9", "got '5 kg**1e9' ("),
         (LENGTH, "5 m^9^9^9^9", "got '5 m^9^9^9^9' ('m^9^9^9^9' is not a unit)"),

@@ -213,13 +213,16 @@ def plot(
     """Draw the pictures of a run, or the satellite that a scenario describes."""
     if suffix not in ("png", "svg", "pdf"):
         raise BadInput(f"--format: expected png, svg or pdf, got '{suffix}'")
-    from quietbus.plots import geometry_figures, save_figures
     from quietbus.scenario import builtin_names
 
-    if what in builtin_names() or Path(what).suffix in (".yaml", ".yml"):
+    path = Path(what)
+    mistyped = not path.suffix and not path.exists()  # the name of a built-in, for all we know
+    if what in builtin_names() or path.suffix in (".yaml", ".yml") or mistyped:
         scenario = load(what, None, None)
         folder = output or OUT
         make_folder(folder)
+        from quietbus.plots import geometry_figures
+
         figures = geometry_figures(scenario)
     else:
         from quietbus.plots import run_figures
@@ -229,9 +232,11 @@ def plot(
             loaded = load_run(what)
         except (FileNotFoundError, ValueError) as error:
             raise BadInput(str(error)) from None
-        folder = output or Path(what).with_suffix("")
+        folder = output or path.with_suffix("")
         make_folder(folder)
         figures = run_figures(loaded)
+    from quietbus.plots import save_figures
+
     for path in save_figures(figures, folder, f".{suffix}"):
         print(f"wrote {path}")
 

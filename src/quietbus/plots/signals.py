@@ -35,7 +35,8 @@ def is_harmonic(run: xr.Dataset) -> bool:
 
 def heading(run: xr.Dataset, what: str) -> str:
     """Title of a picture of a run."""
-    return f"{what} ({run.attrs['title']}{cut_short(run)})"
+    title = run.attrs.get("title", run.attrs["mount"])  # a run that others have made may lack it
+    return f"{what} ({title}{cut_short(run)})"
 
 
 def cut_short(run: xr.Dataset) -> str:

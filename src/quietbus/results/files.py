@@ -20,6 +20,7 @@ from quietbus.results.checks import check_file_parts, check_heaps, check_run
 from quietbus.results.origin import refuse_no_run
 from quietbus.writing import replacing
 
+SIGNATURE = b"\x89HDF\r\n\x1a\n"  # with which HDF5 files begin
 # behind the end of what HDF5 reads, with the hash of all before; who changes the file cuts it off
 SEAL = b"quietbus seal 1\n"
 
@@ -171,6 +172,9 @@ def load_run(path: str | os.PathLike[str]) -> xr.Dataset:
 def _load(path: pathlib.Path) -> xr.Dataset:
     """All of a NetCDF-4 file in memory."""
     size = path.stat().st_size
+    with path.open("rb") as file:
+        if file.read(len(SIGNATURE)) != SIGNATURE:
+            raise ValueError(f"{path}: not a NetCDF-4 file (expected a run, as simulate writes it)")
     try:
         with path.open("rb") as file:
             _refuse_broken_seal(file, size)

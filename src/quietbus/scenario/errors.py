@@ -78,20 +78,38 @@ class UnknownKey:
     def __init__(self, key: str, known: Iterable[str]) -> None:
         known = list(known)
         close = difflib.get_close_matches(key[:60], known, n=1)
-        hint = f"did you mean '{close[0]}'?" if close else f"known here: {', '.join(known)}"
+        if not close:  # BUS for bus
+            close = [name for name in known if name.lower() == key.lower()]
+        self.meant = close[0] if close else None
+        hint = f"did you mean '{self.meant}'?" if close else f"known here: {', '.join(known)}"
         self.message = f"unknown key {shown(key)}; {hint}"
 
 
 def found(
     error: ValidationError, line_of: Callable[[Path], int | None] | None = None
 ) -> list[Problem]:
-    """Pydantic's findings as problems, in the order of the file."""
+    """Pydantic's findings as problems, in the order of the file.
+
+    A key that is missing because it is misspelt is told once, as the misspelt one.
+    """
     problems: dict[Problem, None] = {}  # an ordered set
-    for details in error.errors(include_url=False):
-        # elements like "<each>" name the branch of a union, not a field
-        path = tuple(key for key in details["loc"] if not str(key).startswith("<"))
+    all_details = error.errors(include_url=False)
+    misspelt = {
+        _field((*details["loc"][:-1], details["input"].meant))
+        for details in all_details
+        if isinstance(details["input"], UnknownKey) and details["input"].meant
+    }
+    for details in all_details:
+        path = _field(details["loc"])
+        if path in misspelt and details["input"] is None:
+            continue
         problems[Problem(_message(details), path, line_of(path) if line_of else None)] = None
     return sorted(problems, key=lambda problem: problem.line or 0)
+
+
+def _field(loc: Path) -> Path:
+    """Elements like "<each>" name the branch of a union, not a field."""
+    return tuple(key for key in loc if not str(key).startswith("<"))
 
 
 def _message(details: ErrorDetails) -> str:

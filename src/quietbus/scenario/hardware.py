@@ -256,11 +256,13 @@ class Rotor(Part):
         findings.raise_any()
         defect = inertia_defect(self.inertia)
         if defect:
+            balanced = inertia_defect(np.diag(np.diag(self.inertia)))
             findings.add(
-                "transverse_inertia",
-                "expected, with the spin inertia "
-                f"{self.inertia[0, 0]:.6g} kg*m^2 and the dynamic imbalance, the inertia "
-                f"of a rigid body, but {defect}",
+                "transverse_inertia" if balanced else "dynamic_imbalance",
+                f"expected, with the spin inertia {self.inertia[0, 0]:.6g} kg*m^2, the transverse "
+                f"inertia {self.transverse_inertia:.6g} kg*m^2 and the dynamic imbalance "
+                f"{self.dynamic_imbalance:.6g} kg*m^2 ({1e7 * self.dynamic_imbalance:.6g} g*cm^2), "
+                f"the inertia of a rigid body, but {defect}",
             )
         findings.raise_any()
         return self

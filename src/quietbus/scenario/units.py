@@ -100,8 +100,11 @@ _NUMBER = re.compile(r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][+-]?\d++)?")
 _POWER = r"(?:\^|\*\*)\s*+\(?\s*+[+-]?\d(?:\.\d)?(?!\s*+(?:\d|\^|\*\*))"
 _UNIT = re.compile(rf"(?:[^\W\d]++|[°%²³]|{_POWER}|1(?=\s*+/)|[*/·()\s])*+")
 _LONGEST_UNIT = 60
-_DASH = re.compile(r"(?<=[^\W\d])-(?=[^\W\d])|(?<=\^\d)-(?=[^\W\d])")
-_RUN_TOGETHER = re.compile(r"(?:kg|[kmM]?N|[cm]?m|ozf?|lbf?|in|ft|rad|g|s)++", re.IGNORECASE)
+_JOINT = re.compile(r"(?<=[^\W\d])[-.](?=[^\W\d])|(?<=\^\d)[-.](?=[^\W\d])")
+_PARTS = r"(?:kg|[kmM]?N|[cm]?m|ozf?|lbf?|in|ft|rad|g|s)++"
+_RUN_TOGETHER = re.compile(_PARTS)
+_RUN_TOGETHER_IN_ANY_CASE = re.compile(_PARTS, re.IGNORECASE)
+_TURNS = ("r", "U", "tr")  # as in r/min; rev is a unit, these are not
 
 
 @functools.cache
@@ -137,7 +140,7 @@ def _meant_unit(text: str) -> str:
     """What a text that is no unit was meant for."""
     if text.startswith(",") and text[1:2].isdecimal():
         return "; numbers have a decimal point"
-    product = _DASH.sub("*", text)
+    product = _JOINT.sub("*", text)
     if product == text or len(text) > _LONGEST_UNIT:
         return ""
     try:
@@ -148,11 +151,16 @@ def _meant_unit(text: str) -> str:
 
 
 def _similar_unit(name: str) -> str:
+    products = "; products are written with *, as in N*m"
+    if name in _TURNS:
+        return "; turns are rev, as in rev/min, which is rpm"
+    if _RUN_TOGETHER.fullmatch(name):  # before the names: Ns is no nanosecond
+        return products
     same = sorted(known for known in _symbols() if known.lower() == name.lower())
     if same:
         return f"; did you mean '{same[0]}'? units mind capitals"
-    if _RUN_TOGETHER.fullmatch(name):
-        return "; products are written with *, as in N*m"
+    if _RUN_TOGETHER_IN_ANY_CASE.fullmatch(name):
+        return products
     close = difflib.get_close_matches(name, _symbols(), n=1)
     return f"; did you mean '{close[0]}'?" if close else ""
 
