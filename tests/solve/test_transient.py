@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from quietbus.dynamics.vibration import Vibration, View
-from quietbus.solve.transient import transient
+from quietbus.solve.transient import Modes, transient
 
 NATURAL = np.linspace(15.0, 26.0, 12)  # [rad/s] of twelve oscillators
 DAMPING = np.linspace(0.3, 0.1, 12)  # [1/s]
@@ -20,7 +20,7 @@ def oscillators():
     plates = SimpleNamespace(w_B=np.zeros(3), p_BP=np.zeros(3))
     slow, none = SimpleNamespace(plates=plates), None
     M, C, K = np.eye(12), np.diag(2.0 * DAMPING), np.diag(NATURAL**2)
-    return Vibration(slow, M, C, K, none, none)
+    return Modes.of(Vibration(slow, M, C, K, none, none))
 
 
 def steady(force, speed):

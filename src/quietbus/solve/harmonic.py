@@ -40,7 +40,7 @@ from quietbus.model.satellite import Satellite
 from quietbus.model.variants import without_disturbance, without_noise
 from quietbus.solve.direct import SLOW, Reached, Solution, Tolerances, integrate
 from quietbus.solve.noise import Broadband, noise_spectra
-from quietbus.solve.transient import Transient, transient
+from quietbus.solve.transient import Modes, Transient, transient
 from quietbus.spatial.rotation import (
     quaternion_multiply,
     quaternion_to_matrix,
@@ -381,13 +381,11 @@ def respond(
     amplitudes: dict[str, np.ndarray] = {}
     poses: list[np.ndarray] = []
     ripple: list[dict[str, np.ndarray]] = []
-    looked: dict[int, Vibration] = {}
     looks = np.unique(np.linspace(0, len(time) - 1, LOOKS).astype(int))
     speeds = np.asarray(rotor_speeds(satellite, states))
     speeds = np.broadcast_to(speeds, (len(time), speeds.shape[-1]))
-    bases: dict[int, Vibration] = {}
+    bases: dict[int, Modes] = {}
     based = np.union1d(looks, _where_speeds_change(speeds))
-    modes: dict[int, np.ndarray] = {}
     done = 0
     try:
         for start in range(0, len(time), INSTANTS):
@@ -403,10 +401,7 @@ def respond(
                 lines = ripple_lines(satellite, small, view)
                 ripple.append({name: np.asarray(v)[: len(these)] for name, v in lines.items()})
             for base in np.intersect1d(based, these).tolist():
-                bases[base] = _instant(small, base - start)
-            for look in np.intersect1d(looks, these).tolist():
-                looked[look] = bases[look]
-                modes[look] = np.linalg.eigvals(looked[look].state_matrix())
+                bases[base] = Modes.of(_instant(small, base - start))
             done = int(these[-1]) + 1
             if progress is not None:
                 progress(float(time[done - 1]))
@@ -417,8 +412,9 @@ def respond(
     ripples = None
     if ripple:
         ripples = {name: np.concatenate([part[name] for part in ripple]) for name in ripple[0]}
-    for look, eigenvalues in modes.items():
-        refuse_resonance(satellite, f"at t = {time[look]:g} s", eigenvalues, speeds[look])
+    looked = {look: bases[look] for look in looks.tolist() if look < done}
+    for look, modes in looked.items():
+        refuse_resonance(satellite, f"at t = {time[look]:g} s", modes.eigenvalues, speeds[look])
     states = jax.tree.map(lambda leaf: np.asarray(leaf)[:done], states)
     orders = np.asarray(orders_of(satellite.disturbance))
     missing = transient(time[:done], np.concatenate(poses), speeds[:done], orders, bases, view)
@@ -438,8 +434,8 @@ def respond(
             f"{100 * error[worst]:.2g} % "
             f"of all lines' sum (estimated; above {100 * SLOW_CHANGE:g} % use method 'direct')"
         )
-    last = modes[max(modes)]
-    growing = _growing(last, 1.0 / max(float(time[-1]), 1e-9))
+    last = looked[max(looked)]
+    growing = _growing(last.eigenvalues, 1.0 / max(float(time[-1]), 1e-9))
     if growing:
         said.append(f"the slow motion is unstable: {growing}")
     if satellite.motor is not None:
@@ -452,17 +448,18 @@ def respond(
                 "its own phase: the jitter that it causes may be wrong by as much (above "
                 f"{SLOW_CHANGE:g} rad use method 'direct')"
             )
-    noise = _broadband(satellite, looked, modes, view)
+    noise = _broadband(satellite, looked, view)
     return Jitter(amplitudes, error, missing, tuple(said), ripples, noise), done
 
 
-def _broadband(satellite, looked, modes, view) -> Broadband | None:
+def _broadband(satellite, looked, view) -> Broadband | None:
     """Spectra of the response to noise at the looks, if there is noise."""
     if satellite.disturbance is None or not satellite.disturbance.noisy:
         return None
     instants = np.array(sorted(looked))
-    small = jax.tree.map(lambda *each: np.stack(each), *(looked[k] for k in instants.tolist()))
-    eigenvalues = np.concatenate([modes[k] for k in instants.tolist()])
+    modes = [looked[k] for k in instants.tolist()]
+    small = jax.tree.map(lambda *each: np.stack(each), *(each.small for each in modes))
+    eigenvalues = np.concatenate([each.eigenvalues for each in modes])
     return Broadband(instants, *noise_spectra(satellite, small, eigenvalues, view))
 
 

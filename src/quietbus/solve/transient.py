@@ -41,18 +41,17 @@ def transient(
     xi: np.ndarray,
     speeds: np.ndarray,
     orders: np.ndarray,
-    bases: Mapping[int, Vibration],
+    bases: Mapping[int, "Modes"],
     view: View,
 ) -> Transient:
     """The transient along a motion that starts without one.
 
     Args:
-        time: (n,) [s].
+        time: (n,) [s], evenly spaced.
         xi: (n, cmg, order, 12) steady response to each line.
         speeds: (n, cmg) of the rotors [rad/s].
         orders: (order,)
-        bases: equations of small vibration (NumPy) by the number of their instant; each serves the
-            instants that it is nearest to.
+        bases: modes by the number of their instant; each serves the instants that it is nearest to.
         view: lines of sight.
     """
     count, lines = len(time), xi.shape[1] * xi.shape[2]
@@ -63,39 +62,43 @@ def transient(
     s, xi = s[:, some], xi[:, some]
     seen = np.asarray(view.line_of_sight)
     rate, image = np.zeros(count), np.zeros((count, len(seen)))
+    step = (time[-1] - time[0]) / max(count - 1, 1)
     y = None
     for start, end, base in _segments(count, bases):
-        small, here = bases[base], slice(start, end + 1)
+        modes, here = bases[base], slice(start, end + 1)
         around = slice(max(start - 1, 0), end + 2)  # slopes need a neighbour
-        steady = _states(small, xi[around], s[around])
-        within = slice(start - around.start, end + 1 - around.start)
-        modes = _Modes.of(small)
-        z = _followed(modes, time[around], s[around], steady, y, within)
-        rate[here] = _size(z, _bus_rate(small) @ modes.V, 1)
+        at = s[:1] if np.all(s == s[0]) else s[around]  # one for all where speeds stay
+        p = _steady(modes, xi[around], at)
+        z = _followed(modes, step, at, p, y, (around.start < start, around.stop <= count))
+        rate[here] = _size(z, _bus_rate(modes.small) @ modes.V, 1)
         if len(seen):
-            image[here] = _size(z, seen @ _image_motions(small) @ modes.V, len(seen))
+            image[here] = _size(z, seen @ _image_motions(modes.small) @ modes.V, len(seen))
         y = z[-1] @ modes.V.T
     return Transient(rate, image)
 
 
 @dataclass(frozen=True)
-class _Modes:
-    """x = V q: states by modes, and back by W."""
+class Modes:
+    """States by modes, x = V q, and back by W."""
 
+    small: Vibration  # whose modes they are (NumPy)
     eigenvalues: np.ndarray  # (m,) [rad/s]
     V: np.ndarray  # (m, m)
     W: np.ndarray  # (m, m)
 
     @classmethod
-    def of(cls, small: Vibration) -> "_Modes":
+    def of(cls, small: Vibration) -> "Modes":
+        """Of equations of small vibration (NumPy)."""
         A, n = small.state_matrix(), len(small.M)
         speed = np.arange(n, 2 * n)
-        A[speed, speed] -= SLIGHT
-        eigenvalues, V = np.linalg.eig(A)
-        return cls(eigenvalues, V, np.linalg.inv(V))
+        damped = A.copy()
+        damped[speed, speed] -= SLIGHT
+        V = np.linalg.eig(damped)[1]
+        W = np.linalg.inv(V)
+        return cls(small, np.sum(W * (A @ V).T, axis=1), V, W)  # undamped to second order
 
 
-def _segments(count: int, bases: Mapping[int, Vibration]) -> list[tuple[int, int, int]]:
+def _segments(count: int, bases: Mapping[int, Modes]) -> list[tuple[int, int, int]]:
     """First and last instant of each stretch, the last being the next one's first; its base."""
     instants = np.array(sorted(bases))
     middles = (instants[1:] + instants[:-1]) // 2
@@ -107,16 +110,22 @@ def _segments(count: int, bases: Mapping[int, Vibration]) -> list[tuple[int, int
     return [(int(a), int(b), int(k)) for (a, b), k in zip(pairwise(edges), nearest, strict=True)]
 
 
-def _states(small: Vibration, xi: np.ndarray, s: np.ndarray) -> np.ndarray:
-    """(n, line, m), as of ``state_matrix``, of responses xi (n, line, 12) at s (n, line)."""
-    pose = xi if small.projection is None else xi[..., 6:]
-    parts = [pose, s[..., None] * pose]
+def _steady(modes: Modes, xi: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """p = W x_s (n, line, m) of responses xi (n, line, 12) at s (n or 1, line)."""
+    W, small = modes.W, modes.small
+    n = len(small.M)
+    unit = np.eye(12)[-n:]  # with a rigid mount the plate's follow the bus's
+    by_pose = W[:, :n] @ unit + s[..., None, None] * (W[:, n : 2 * n] @ unit)
     if small.control is not None:
-        at = s[:1] if np.all(s == s[0]) else s  # one solution for all where speeds stay
-        memory = _memory(small, at) @ xi[..., 9:, None]
-        gimbals = memory[..., :-3, 0]
-        parts += [gimbals, s[..., None] * gimbals, memory[..., -3:, 0]]
-    return np.concatenate(parts, axis=-1)
+        memory = _memory(small, s)
+        gimbals = memory.shape[-2] - 3
+        by_angle, by_rate, by_integral = np.split(W[:, 2 * n :], [gimbals, 2 * gimbals], axis=1)
+        by_angle = by_angle + s[..., None, None] * by_rate
+        answer = by_angle @ memory[..., :gimbals, :] + by_integral @ memory[..., gimbals:, :]
+        by_pose[..., 9:] += answer
+    if len(s) == 1:
+        return np.swapaxes(np.swapaxes(xi, 0, 1) @ np.swapaxes(by_pose[0], 1, 2), 0, 1)
+    return (by_pose @ xi[..., None])[..., 0]
 
 
 def _memory(small: Vibration, s: np.ndarray) -> np.ndarray:
@@ -171,46 +180,44 @@ def _size(z: np.ndarray, output: np.ndarray, count: int) -> np.ndarray:
 
 
 def _followed(
-    modes: _Modes,
-    time: np.ndarray,
+    modes: Modes,
+    step: float,
     s: np.ndarray,
-    steady: np.ndarray,
+    p: np.ndarray,
     y: np.ndarray | None,
-    within: slice,
+    neighbours: tuple[bool, bool],
 ) -> np.ndarray:
-    """Transient W y (n, line, m) ``within`` times, from its first value y (line, m) or none.
+    """Transient W y (n, line, m), from its first value y (line, m) or none.
 
     With q = W (x_s + y) and p = W x_s each mode obeys dq/dt = mu q - mu p, mu = eigenvalue - s. A
     resonance is in p as it is in 1/mu, so that mu p is even where p has its peak: a cubic in each
     interval.
+
+    Args:
+        step: [s] from instant to instant.
+        s: (n or 1, line) [rad/s].
+        p: (n, line, m).
+        neighbours: whether s and p have one more instant before the first and after the last.
     """
-    p = steady @ modes.W.T
-    alike = np.all(s == s[0])
-    mu = modes.eigenvalues - (s[:1] if alike else s)[..., None]
-    f = -mu * p
-    slope = np.gradient(f, time, axis=0, edge_order=2 if len(time) > 2 else 1)[within]
-    f, p, time = f[within], p[within], time[within]
+    mu = modes.eigenvalues - s[..., None]
+    every, within = p, slice(int(neighbours[0]), len(p) - int(neighbours[1]))
+    p = p[within]
     z = np.zeros_like(p)
     if y is not None:
         z[0] = y @ modes.W.T
     if len(p) > 1:
-        span = np.diff(time)
-        if alike and np.ptp(span) <= 1e-9 * span[0]:
-            span, mu = span[:1], np.repeat(mu, 2, axis=0)  # the same for all
-        elif not alike:
-            mu = mu[within]
-        else:
-            mu = np.repeat(mu, len(p), axis=0)
-        turned, by_f, by_slope = _weights(mu, span[:, None, None])
+        before, after = (mu, mu) if len(s) == 1 else (mu[within][:-1], mu[within][1:])
+        turned, weights = _weights(before, after, step)
+        f = _extended(-mu * every, neighbours)
         gained = turned * p[:-1]
         gained -= p[1:]
-        for weight, values in zip(
-            (*by_f, *by_slope), (f[:-1], f[1:], slope[:-1], slope[1:]), strict=True
-        ):
-            gained += weight * values
-        middle = 0.5 * (mu[1:] + mu[:-1])
+        for k, weight in enumerate(weights):
+            gained += weight * f[k : len(gained) + k]
+        middle = 0.5 * (before + after)
         slow = np.abs(modes.eigenvalues) < SLOW_MODE * np.abs(middle)
-        gained = np.where(slow, np.diff(p, axis=0) / (span[:, None, None] * middle), gained)
+        lag = np.diff(p, axis=0)
+        lag /= step * middle
+        np.copyto(gained, lag, where=slow)
         factors = np.broadcast_to(np.where(slow, 0.0, turned), gained.shape)
         for now, following, factor, more in zip(z[:-1], z[1:], factors, gained, strict=True):
             np.multiply(now, factor, out=following)
@@ -218,18 +225,27 @@ def _followed(
     return z
 
 
-def _weights(mu: np.ndarray, span: np.ndarray):
+def _extended(f: np.ndarray, neighbours: tuple[bool, bool]) -> np.ndarray:
+    """f (n, ...), n > 1, with one instant more, on a parabola, at either end that has none."""
+    first, last = f[:3], f[-1:-4:-1]
+    beyond = lambda e: (3.0 * (e[0] - e[1]) + e[2] if len(e) > 2 else 2.0 * e[0] - e[1])[None]  # noqa: E731
+    parts = [beyond(first)] * (not neighbours[0]) + [f] + [beyond(last)] * (not neighbours[1])
+    return np.concatenate(parts) if len(parts) > 1 else f
+
+
+def _weights(before: np.ndarray, after: np.ndarray, step: float):
     """Over each interval: exp of the integral of mu, even in time, and weights.
 
-    They are of f and of its slope, at either end, in what a cubic f adds to q.
+    They are of f at four instants, the interval's ends being the middle two, in what f adds to q:
+    a cubic, its slopes being those of parabolas.
     """
-    change = np.max(np.abs(np.diff(mu, axis=0)) * span, initial=0.0)
+    change = np.max(np.abs(after - before)) * step
     parts = max(1, int(np.ceil(np.sqrt(change / (8.0 * CHIRP)))))
-    h, n = span / parts, 1.0 / parts
+    h, n = step / parts, 1.0 / parts
     turned, moments = np.ones((1, 1, 1)), [np.zeros((1, 1, 1))] * 4
     for i in range(parts):
         x = i * n
-        once, *phi = _exponentials(h * (mu[:-1] + (i + 0.5) * n * (mu[1:] - mu[:-1])))
+        once, *phi = _exponentials(h * (before + (i + 0.5) * n * (after - before)))
         local = [h * phi[0], h * n * phi[1], 2.0 * h * n**2 * phi[2], 6.0 * h * n**3 * phi[3]]
         powers = [  # of the share of the interval that is past, about x
             sum(comb(k, j) * x ** (k - j) * local[j] for j in range(k + 1)) for k in range(4)
@@ -238,8 +254,8 @@ def _weights(mu: np.ndarray, span: np.ndarray):
         turned = once * turned
     even, first, second, third = moments
     rise = 3.0 * second - 2.0 * third  # Hermite's cubics
-    by_slope = span * (first - 2.0 * second + third), span * (third - second)
-    return turned, (even - rise, rise), by_slope
+    start, end = 0.5 * (first - 2.0 * second + third), 0.5 * (third - second)  # of slopes
+    return turned, (-start, even - rise - end, rise + start, end)
 
 
 def _exponentials(x: np.ndarray) -> list[np.ndarray]:
