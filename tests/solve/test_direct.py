@@ -8,7 +8,7 @@ import pytest
 import quietbus as qb
 from quietbus.build import build_initial_state, build_satellite
 from quietbus.scenario import load_scenario
-from quietbus.solve.direct import Scheme, Tolerances, integrate
+from quietbus.solve.direct import SLOW, Scheme, Tolerances, integrate
 
 QUIET = {"control": "none", "initial.attitude": [0, 0, 0]}
 
@@ -190,3 +190,16 @@ def test_rigid_mount_keeps_the_plate_on_the_bus():
     legs = run.outputs.leg_stroke
     assert np.max(np.abs(legs)) < 1e-15
     assert np.max(np.abs(run.outputs.leg_force)) < 1e-9
+
+
+def test_a_run_may_end_where_a_load_jumps():
+    """The last step's last stage lies at the end, where the load is there already."""
+    step = {"body": "bus", "force": [0.0, 3.0, 0.0], "profile": {"step": {"start": 0.1}}}
+    tight = Tolerances(1e-10, 1e-14)
+    there, beyond = (fly({"loads": [step]}, end, 100.0, tight, scheme=SLOW) for end in (0.1, 0.11))
+    assert there.stopped is None
+    assert len(there.time) == 11
+    for name in ("p_NB_N", "v_NB_N", "w_NB_B"):
+        expected = getattr(beyond.states, name)[10]
+        found = getattr(there.states, name)[10]
+        np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-13)

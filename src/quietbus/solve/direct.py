@@ -205,20 +205,26 @@ def _compiled_piece(satellite, state, numbers, scheme) -> _Piece:
     if not scheme.averaged:
         line = fastest_line(satellite, moments, unravel)
         controller = ResolvingController(controller, line)
+    finish = t1
     corners = [load.profile.corners for load in satellite.loads]
     if satellite.cluster.run_up is not None:
         corners.append(satellite.cluster.run_up.corners)
     if sum(len(corner) for corner in corners):
         jumps = _apart(jnp.sort(jnp.concatenate(corners)), t0, t1)
+        # the last stage of the last step must not see what lies beyond a corner at the end
+        finish = jnp.where(jnp.any(jumps == t1), jnp.nextafter(t1, t0), t1)
+        jumps = jnp.where(jumps == t1, jnp.inf, jumps)
         controller = diffrax.ClipStepSizeController(controller, jump_ts=jumps)
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(rate),
         scheme.solver(),
         t0,
-        t1,
-        jnp.minimum(step, t1 - t0),
+        finish,
+        jnp.minimum(step, finish - t0),
         y0,
-        saveat=diffrax.SaveAt(subs=[diffrax.SubSaveAt(ts=ts), diffrax.SubSaveAt(t1=True)]),
+        saveat=diffrax.SaveAt(
+            subs=[diffrax.SubSaveAt(ts=jnp.minimum(ts, finish)), diffrax.SubSaveAt(t1=True)]
+        ),
         stepsize_controller=controller,
         event=diffrax.Event(left_geometry),
         adjoint=diffrax.ForwardMode(),
@@ -226,7 +232,7 @@ def _compiled_piece(satellite, state, numbers, scheme) -> _Piece:
         throw=False,
     )
     saved, (last,) = solution.ys
-    time_reached = solution.ts[1][0]
+    time_reached = jnp.where(solution.ts[1][0] == finish, t1, solution.ts[1][0])
     valid = (ts <= time_reached) & jnp.all(jnp.isfinite(saved), axis=1)
     ended = (solution.result == diffrax.RESULTS.successful) | (
         solution.result == diffrax.RESULTS.max_steps_reached
