@@ -40,7 +40,7 @@ def with_jitter(satellite, time, run):
 @pytest.mark.parametrize("mount", MOUNTS)
 @pytest.mark.parametrize(
     ("name", "moving", "quiet", "duration"),
-    [("zhang2012", (0.5, 1.0), (11.0, 12.0), 12.0), ("zhang2012-slew", (1.0, 2.0), None, 2.0)],
+    [("zhang2012", (0.5, 1.0), (5.0, 6.0), 6.0), ("zhang2012-slew", (1.0, 2.0), None, 2.0)],
 )
 def test_agrees_with_the_direct_solver(name, moving, quiet, duration, mount):
     """The issue's bounds: 1e-4 in amplitude, 1 % while gimbals move, 1e-3 rad, 1e-6 rad/s."""
@@ -63,10 +63,11 @@ def test_agrees_with_the_direct_solver(name, moving, quiet, duration, mount):
         assert np.max(np.abs(np.angle(found / expected))) < 1e-3
         assert np.max(np.abs((whole - truth)[here].mean(axis=0))) < 1e-6
         if window is moving:
-            # faster than asked for; and the estimate tells how much it matters
+            # faster than asked for; and the estimate tells how far the signal is off, ring-down
+            # included, at the worst instant
             assert np.max(np.abs(direct.outputs.gimbal_rate[here])) > 0.1
-            error = np.linalg.norm(found - expected) / np.linalg.norm(expected)
-            assert 0.25 < error / np.max(run.jitter.change_error[here]) < 4.0
+            missing = np.max(np.linalg.norm((whole - truth)[here], axis=1))
+            assert 0.3 < missing / np.max(run.jitter.missing.bus_rate[here]) < 2.0
     assert run.jitter.warnings == ()
 
 
