@@ -114,12 +114,11 @@ def test_a_slight_error_in_the_accelerations_is_found(monkeypatch):
 def test_every_check_of_a_rigid_awkward_satellite_passes():
     """Gimbal motors that ripple and step, order tables, loads, a slew, and a steady start."""
     said = []
-    found = validate(awkward_rigid(), random_states=3, duration=0.05, progress=said.append)
+    found = validate(awkward_rigid(), random_states=3, duration=0.01, progress=said.append)
     assert [check.name for check in found] == [
         "start",
         "accelerations",
         "control",
-        "struts and motors",
         "flight",
         "linear momentum",
         "angular momentum",

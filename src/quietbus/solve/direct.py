@@ -177,7 +177,8 @@ class _Piece(eqx.Module):
 
 def _piece(satellite, state, t0, t1, step, ts, tolerances, scheme) -> _Piece:
     numbers = (t0, t1, step, ts, tolerances.relative, tolerances.absolute)
-    arrays = tuple(jnp.asarray(number) for number in numbers)
+    # of one type: Python's numbers and NumPy's would each have a program traced
+    arrays = tuple(jnp.asarray(number, dtype=float) for number in numbers)
     return jax.block_until_ready(_compiled_piece(satellite, state, arrays, scheme))
 
 

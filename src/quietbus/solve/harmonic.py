@@ -38,7 +38,7 @@ from quietbus.model.cmg import ClusterMoments
 from quietbus.model.disturbance import orders_of
 from quietbus.model.satellite import Satellite
 from quietbus.model.variants import without_disturbance, without_noise
-from quietbus.solve.direct import SLOW, Reached, Solution, Tolerances, integrate
+from quietbus.solve.direct import SLOW, Reached, Scheme, Solution, Tolerances, integrate
 from quietbus.solve.noise import Broadband, noise_spectra
 from quietbus.solve.transient import Modes, Transient, transient
 from quietbus.spatial.rotation import (
@@ -102,6 +102,7 @@ def integrate_harmonic(
     progress: Callable[[float], None] | None = None,
     keep: Callable[[Reached], None] | None = None,
     start: Reached | None = None,
+    scheme: Scheme = SLOW,
 ) -> HarmonicSolution:
     """Slow motion and jitter from t = 0 to ``duration`` [s], every 1/``output_rate`` [Hz].
 
@@ -110,7 +111,7 @@ def integrate_harmonic(
         view: points and lines of sight at which to give the jitter too.
         progress: called with the time reached [s], first of the slow motion (counted half), then
             of the jitter.
-        keep, start: of the slow motion, as of ``integrate``.
+        keep, start, scheme: of the slow motion, as of ``integrate``.
 
     Raises:
         ResonanceError: an order of a rotor lies on an undamped mode.
@@ -118,7 +119,9 @@ def integrate_harmonic(
     half = progress and (lambda t: progress(0.5 * t))
     if not steady and start is None:
         initial = without_jitter(satellite, initial)
-    slow = integrate(satellite, initial, duration, output_rate, tolerances, SLOW, half, keep, start)
+    slow = integrate(
+        satellite, initial, duration, output_rate, tolerances, scheme, half, keep, start
+    )
     second = progress and (lambda t: progress(0.5 * (slow.time[-1] + t)))
     if slow.stopped and not slow.interrupted:
         slow = replace(slow, stopped=f"{slow.stopped}. {_growth(satellite, slow)}".strip())

@@ -19,7 +19,7 @@ from quietbus.validate.motions import kicked
 from quietbus.validate.subject import Check, Subject
 from quietbus.validate.trajectory import fastest_rate
 
-FLIGHT = 150.0  # [rad] that the fastest rotor, or mode, turns in a flight
+FLIGHT = 100.0  # [rad] that the fastest rotor, or mode, turns in a flight
 
 
 def validate(
@@ -67,7 +67,7 @@ def run_checks(
     yield from check_instants(subject, random_states, rng)
     tell("flight")
     if duration is None:
-        duration = _duration(subject)
+        duration = flight_duration(subject)
     start = kicked(subject.reference, subject.reference.initial(), rng)
     flight = fly_both(subject, start, duration)
     yield check_flight(subject, flight)
@@ -79,7 +79,7 @@ def run_checks(
     yield from check_harmonic(subject, flight)
 
 
-def _duration(subject: Subject) -> float:
+def flight_duration(subject: Subject) -> float:
     """As long as the fastest rotor, or mode, takes for a few turns; at most 1 s."""
     fastest = fastest_rate(subject.satellite)
     return min(1.0, FLIGHT / fastest, subject.scenario.simulation.duration)

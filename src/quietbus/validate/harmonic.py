@@ -1,5 +1,6 @@
 """The rotors' lines: the harmonic solver and `jitter` against flights of the reference."""
 
+from dataclasses import replace
 from typing import Any
 
 import equinox as eqx
@@ -8,17 +9,17 @@ import numpy as np
 
 from quietbus.analysis.jitter import AT_REST, rest_error, steady_jitter
 from quietbus.dynamics.state import State
-from quietbus.dynamics.vibration import NOTHING_SEEN
+from quietbus.dynamics.vibration import Vibration
 from quietbus.model.disturbance import orders_of
 from quietbus.model.satellite import Satellite
-from quietbus.solve.direct import Tolerances
+from quietbus.solve.direct import SLOW, Tolerances
 from quietbus.solve.harmonic import (
     HarmonicSolution,
     ResonanceError,
     integrate_harmonic,
     on_periodic_solution,
 )
-from quietbus.validate.flight import SAMPLES, Flight
+from quietbus.validate.flight import SAMPLES, Flight, ended
 from quietbus.validate.subject import Check, Subject, apart
 from quietbus.validate.translate import motion_of, state_of
 
@@ -30,24 +31,26 @@ SLOPPY = 0.05  # share of the lines by which a moving satellite's may be off
 
 def check_harmonic(subject: Subject, flight: Flight) -> list[Check]:
     """A run in motion, and the lines at rest; nothing where no rotor has lines."""
+    at_rest, piece = subject.changed(_rest), float(flight.times[-1])
+    amplitudes, _ = _jitter(at_rest)
+    turn = _size(amplitudes["bus_attitude"][None])
+    if turn == 0.0:
+        return []
+    small = at_rest.changed(lambda data: _scale(data, SMALL / turn if np.isfinite(turn) else 1.0))
     try:
-        run = _run(subject.satellite, flight.start, float(flight.times[-1]))
+        checks = _at_rest(small, piece, subject.scenario.initial.steady)
+        # ripple is no line of a rotor, and lines of rotors that run up begin with nothing
+        if subject.satellite.motor is None and subject.satellite.cluster.run_up is None:
+            run = _run(subject.satellite, flight.start, piece, piece)
+            checks.insert(0, _in_motion(subject, flight, run))
     except ResonanceError:
         return []
-    turn = _size(run.jitter.amplitudes["bus_attitude"])
-    if run.slow.stopped is None and not turn > 0.0:
-        return []
-    checks = []
-    # ripple is no line of a rotor, and lines of rotors that run up begin with nothing
-    if subject.satellite.motor is None and subject.satellite.cluster.run_up is None:
-        checks.append(_in_motion(subject, flight, run))
-    at_rest = subject.changed(lambda data: _rest(data, SMALL / turn))
-    return checks + _at_rest(at_rest, subject.scenario.initial.steady)
+    return checks
 
 
 def _in_motion(subject: Subject, flight: Flight, run: HarmonicSolution) -> Check:
     error = np.nan
-    if not run.slow.stopped:
+    if not ended(run.slow, len(flight.times)):
         states = run.slow.states
         amplitude = run.jitter.amplitudes["bus_rate"]
         lines = _in_time(subject.satellite, flight.times, states, amplitude)
@@ -63,22 +66,23 @@ def _in_motion(subject: Subject, flight: Flight, run: HarmonicSolution) -> Check
     )
 
 
-def _at_rest(subject: Subject, steady: bool) -> list[Check]:
+def _at_rest(subject: Subject, piece: float, steady: bool) -> list[Check]:
     """From rest: slow motion by the harmonic solver, lines by `jitter`.
 
     Args:
+        piece: how long the run in motion is [s]; as its pieces are, its program serves.
         steady: start with the lines' own motion, so that they cause no transient.
     """
     satellite, reference = subject.satellite, subject.reference
-    angle = jnp.asarray(reference.mechanism.units.gimbal_angle)
-    amplitudes, small = _jitter(satellite, angle)
+    amplitudes, small = _jitter(subject)
     if not rest_error(small) <= AT_REST:
         return []
     speed = np.abs(reference.mechanism.units.speed)
-    duration = TURNS * 2.0 * np.pi / np.min(speed[speed > 0.0])
-    times = np.arange(SAMPLES + 1) * (duration / SAMPLES)
+    rate = SAMPLES / piece
+    count = int(np.ceil(rate * TURNS * 2.0 * np.pi / np.min(speed[speed > 0.0])))
+    times = np.arange(count + 1) / rate
     start = reference.initial()
-    run = _run(satellite, state_of(satellite, start), duration, steady)
+    run = _run(satellite, state_of(satellite, start), times[-1], piece, steady)
     if steady:
         start = motion_of(satellite, on_periodic_solution(satellite, state_of(satellite, start)))
     motions = reference.fly(start, times, 1e-10, 1e-16)
@@ -86,29 +90,38 @@ def _at_rest(subject: Subject, steady: bool) -> list[Check]:
         "bus_rate": np.array([motion.w_NB_B for motion in motions]),
         "platform_rate": np.array([motion.w_NP_P for motion in motions]),
     }
-    ours = {}
-    for name in theirs:
-        constant = np.broadcast_to(amplitudes[name], (len(times), *amplitudes[name].shape))
-        lines = _in_time(satellite, times, run.slow.states, constant)
-        ours[name] = np.asarray(getattr(run.slow.outputs, name)) + lines
+    error = np.nan
+    if not ended(run.slow, len(times)):
+        ours = {}
+        for name in theirs:
+            constant = np.broadcast_to(amplitudes[name], (len(times), *amplitudes[name].shape))
+            lines = _in_time(satellite, times, run.slow.states, constant)
+            ours[name] = np.asarray(getattr(run.slow.outputs, name)) + lines
+        error = apart(theirs, ours)
     return [
         Check(
             "lines from rest",
             f"lines of `jitter`{'' if steady else ' and the transient that they cause'}, against "
             f"{TURNS} turns flown with MuJoCo, control on: bus and plate rate, imbalance scaled "
             "until it counts to first order only",
-            np.nan if run.slow.stopped else apart(theirs, ours),
+            error,
             1e-4,
         )
     ]
 
 
 def _run(
-    satellite: Satellite, start: State, duration: float, steady: bool = False
+    satellite: Satellite, start: State, duration: float, piece: float, steady: bool = False
 ) -> HarmonicSolution:
-    rate, view = SAMPLES / duration, NOTHING_SEEN
+    """Sampled SAMPLES times in a piece, which keeps the program small."""
     return integrate_harmonic(
-        satellite, start, duration, rate, steady=steady, view=view, tolerances=TIGHT
+        satellite,
+        start,
+        duration,
+        SAMPLES / piece,
+        steady=steady,
+        tolerances=TIGHT,
+        scheme=replace(SLOW, piece=piece),
     )
 
 
@@ -130,13 +143,20 @@ def _size(amplitude: np.ndarray) -> float:
     return float(np.max(np.linalg.norm(np.sum(np.abs(amplitude), axis=(1, 2)), axis=-1)))
 
 
+def _jitter(subject: Subject) -> tuple[dict[str, np.ndarray], Vibration]:
+    """Amplitudes (cmg, order, ...) at rest, and the equations that they solve."""
+    angle = jnp.asarray(subject.reference.mechanism.units.gimbal_angle)
+    amplitudes, small = _compiled_jitter(subject.satellite, angle)
+    return {name: np.asarray(each) for name, each in amplitudes.items()}, small
+
+
 @eqx.filter_jit
-def _jitter(satellite, gimbal_angle):
+def _compiled_jitter(satellite, gimbal_angle):
     return steady_jitter(satellite, gimbal_angle)
 
 
-def _rest(data: dict[str, Any], scale: float) -> None:
-    """Let a scenario's satellite rest at its target, with its rotors' lines scaled.
+def _rest(data: dict[str, Any]) -> None:
+    """Let a scenario's satellite rest at its target.
 
     Loads, guidance and run-up stay, doing nothing, so that programs do.
     """
@@ -150,6 +170,11 @@ def _rest(data: dict[str, Any], scale: float) -> None:
         own = cluster.get("units") or [{}] * cluster["pyramid"]["units"]
         speeds = [unit.get("rotor", {}).get("speed", cluster["rotor"]["speed"]) for unit in own]
         cluster["run_up"].update(initial_speed=speeds, final_speed=speeds)
+
+
+def _scale(data: dict[str, Any], scale: float) -> None:
+    """Scale the lines of all rotors."""
+    cluster = data["cluster"]
     for rotor in [cluster["rotor"], *(unit.get("rotor", {}) for unit in cluster.get("units", []))]:
         for lines in [rotor, *((rotor.get("disturbance") or {}).get("orders") or [])]:
             for key in _LINES.intersection(lines):
