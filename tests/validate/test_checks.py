@@ -1,6 +1,7 @@
 """The user's verdict: right satellites pass, each kind of wrong one is seen."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import jax
 import numpy as np
@@ -11,6 +12,7 @@ from oracles.scenarios import awkward_rigid, awkward_scenario, awkward_wheels
 from quietbus.build import build_satellite
 from quietbus.scenario import load_scenario
 from quietbus.validate import Check, instants, not_covered, validate
+from quietbus.validate.flight import ended
 from quietbus.validate.instants import check_instants, check_start
 from quietbus.validate.subject import Subject, apart
 
@@ -143,6 +145,13 @@ def test_what_is_not_covered_is_said():
         }
     )
     assert any("broadband" in each for each in not_covered(noisy))
+
+
+def test_a_run_with_fewer_instants_than_asked_for_has_ended():
+    solution = SimpleNamespace(time=np.zeros(8), stopped=None)
+    assert ended(solution, 21) == "8 of 21 instants computed"
+    assert not ended(solution, 8)
+    assert ended(SimpleNamespace(time=np.zeros(8), stopped="diverged"), 8) == "diverged"
 
 
 def test_an_error_that_is_no_number_fails():
