@@ -42,7 +42,8 @@ def _code_blocks():
         for match, after in itertools.pairwise([*blocks, None]):
             if match[1] == "python":
                 line = text[: match.start()].count("\n") + 2
-                shown = after[2] if after and after[1] == "text" else ""
+                follows = after is not None and not text[match.end() : after.start()].strip()
+                shown = after[2] if follows and after[1] == "text" else ""
                 yield pytest.param(page, line, match[2], shown, id=f"{_name(page)}:{line}")
 
 
@@ -55,7 +56,7 @@ def _unquoted(cell: str) -> str:
 def test_python_in_the_documentation_gives_what_is_shown(
     page, line, code, shown, tmp_path, monkeypatch, capsys
 ):
-    """A block ``text`` after the code is its output, or some lines of it."""
+    """A block ``text`` right after the code is its output, or some lines of it."""
     monkeypatch.chdir(tmp_path)
     # blank lines before the code, so that a failure points into the page
     exec(compile("\n" * (line - 1) + code, str(page), "exec"), {"__name__": "__docs__"})

@@ -174,7 +174,7 @@ def test_sensitivities_of_a_wrong_shape_are_refused():
     for given, said in (
         (np.ones((2, 11)), "one to three rows of 12 numbers"),
         (np.ones((4, 12)), "one to three rows of 12 numbers"),
-        (np.full((1, 12), np.nan), "finite numbers"),
+        (np.full((1, 12), np.nan), "all finite"),
     ):
         with pytest.raises(ValueError, match=said):
             qb.simulate("zhang2012", method="harmonic", lines_of_sight={"a": given})
