@@ -1,7 +1,12 @@
 """What all tests share."""
 
 import gc
+import os
 from pathlib import Path
+
+# Most of the tests' time is compilation, of programs that then run for a moment: without LLVM's
+# optimisations it takes half as long. Results differ by rounding, which no test may rest on.
+os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} --xla_backend_optimization_level=0"
 
 import jax
 import pytest
