@@ -300,7 +300,7 @@ def test_what_cannot_be_put_together_is_refused_by_name(paper):
     other = parts[1].with_overrides({"bus.mass": 900})
     with pytest.raises(qb.ScenarioError, match=r"cmg1: bus: expected the same as in 'zhang2012-cm"):
         qb.platforms([parts[0], other])
-    with pytest.raises(qb.ScenarioError, match="at least one scenario"):
+    with pytest.raises(ValueError, match="scenarios: expected one or more"):
         qb.platforms([])
     with pytest.raises(ValueError, match="expected 4 lists, one for each scenario, got 1"):
         qb.platforms(parts, [[0.0]])

@@ -110,7 +110,7 @@ def test_harmonic_runs_show_the_combined_jitter_and_a_bar_for_each_rotor_and_ord
     assert "worst_case, as made by hand" in shown["envelope"].caption
     about_y = {line.name: line.y for line in drawn(shown["envelope"]) if line.yaxis == "y2"}
     assert about_y.keys() == {"envelope", "worst case", "root sum square", "RMS"}
-    expected = np.rad2deg(run["bus_rate_jitter_rss"].sel(axis=1))
+    expected = np.rad2deg(run["bus_rate_jitter_rss"].sel(axis="y"))
     np.testing.assert_allclose(about_y["root sum square"], expected)
     bars = drawn(shown["lines"])
     assert len(bars) == 12

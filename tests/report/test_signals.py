@@ -75,6 +75,7 @@ def test_times_are_those_of_the_samples():
 def test_envelope_at_the_end_is_the_jitter_of_the_summary():
     run = vibrating()
     sizes = {"attitude_error": 3, "gimbal_rate": 4, "leg_stroke": 6, "leg_force": 6}
+    sizes |= {"control_torque": 3}
     for name, size in sizes.items():
         run[name] = (("time", name), np.zeros((run.sizes["time"], size)))
     run["singularity_measure"] = ("time", np.ones(run.sizes["time"]))
