@@ -161,6 +161,10 @@ def test_jitter_of_a_flight_is_what_rides_on_the_slow_motion():
     assert peaks[1:-1] == pytest.approx(expected, rel=0.01)
 
 
+def test_the_papers_own_rates_have_the_papers_ratio():
+    assert flights._printed_ratio() == pytest.approx(1.1e-5 / 3.4e-4)
+
+
 def test_euler_angles_of_the_pictures_are_yaw_pitch_roll():
     roll, pitch, yaw = np.radians([60.0, 30.0, -60.0])
     product = np.array([1.0, 0.0, 0.0, 0.0])
