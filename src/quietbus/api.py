@@ -171,7 +171,8 @@ def compare(
     Args:
         duration: [s], instead of the scenario's own.
         progress: called with the mount and the simulated time reached [s].
-        checkpoints, resume: as of ``simulate``, a file for each mount.
+        checkpoints: by mount, the file that keeps a run while it goes, as of ``simulate``.
+        resume: go on from them, as of ``simulate``.
     """
     function("progress", progress)
     mounts: tuple[Mount, ...] = ("isolated", "rigid")
