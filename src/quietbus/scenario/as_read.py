@@ -41,7 +41,9 @@ def as_read(scenario: Scenario) -> list[tuple[str, str]]:
         )
     )
     run = scenario.simulation
-    rows.append(("run", f"{plain(run.duration)} s, direct output at {plain(run.output_rate)} Hz"))
+    rows.append(
+        ("run", f"{plain(run.duration)} s; direct runs write at {plain(run.output_rate)} Hz")
+    )
     return rows
 
 
