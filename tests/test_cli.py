@@ -170,8 +170,8 @@ def test_bad_scenario_names_file_line_field_and_what_was_expected(command, tmp_p
 
 
 def test_run_that_diverges_keeps_what_it_has_and_ends_with_status_1(command, tmp_path):
-    path = short(tmp_path, **{"kp: 200.0": "kp: 2.0e+5", "kd: 2500.0": "kd: 2.5e+6"})
-    status, _, err = command("simulate", path, "--duration", "30 s", "-o", "run.nc")
+    path = short(tmp_path, **{"kp: 200.0": "kp: 2.0e+7", "kd: 2500.0": "kd: 2.5e+8"})
+    status, _, err = command("simulate", path, "--duration", "5 s", "-o", "run.nc")
     assert status == 1
     assert "at t = " in err
     assert qb.load_run(tmp_path / "run.nc").attrs["status"] == "stopped"

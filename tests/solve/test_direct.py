@@ -57,8 +57,9 @@ def test_jitter_in_the_output_is_as_accurate_as_the_default_tolerance_promises(e
 def test_motion_does_not_depend_on_the_output_rate():
     coarse, fine = fly(duration=1.5, output_rate=100.0), fly(duration=1.5, output_rate=1000.0)
     assert coarse.steps == fine.steps
-    np.testing.assert_array_equal(coarse.outputs.bus_rate, fine.outputs.bus_rate[::10])
-    np.testing.assert_array_equal(coarse.final.w_NB_B, fine.final.w_NB_B)
+    # two programs, which may round apart
+    np.testing.assert_allclose(coarse.outputs.bus_rate, fine.outputs.bus_rate[::10], atol=1e-12)
+    np.testing.assert_allclose(coarse.final.w_NB_B, fine.final.w_NB_B, atol=1e-12)
 
 
 @pytest.mark.parametrize("rate", [0.7, 30.0, 128.5])
@@ -138,7 +139,7 @@ def test_short_load_late_in_a_calm_run_is_not_stepped_over():
 
 def test_unstable_loop_stops_with_the_time_and_a_reason_and_keeps_what_it_has():
     scenario = load_scenario("zhang2012").with_overrides(
-        {"control.pid.kp": 2e5, "control.pid.kd": 2.5e6, "simulation.duration": 30.0}
+        {"control.pid.kp": 2e7, "control.pid.kd": 2.5e8, "simulation.duration": 5.0}
     )
     with pytest.raises(qb.SimulationError, match=r"at t = \d.*Likely") as stopped:
         qb.simulate(scenario)

@@ -58,7 +58,7 @@ def transient(
     s = 1j * (speeds[:, :, None] * orders).reshape(count, lines)
     xi = xi.reshape(count, lines, 12)
     sizes = np.max(np.abs(xi), axis=(0, 2))
-    some = sizes > NOTHING * np.max(sizes)
+    some = sizes > NOTHING * np.max(sizes, initial=0.0)
     s, xi = s[:, some], xi[:, some]
     seen = np.asarray(view.line_of_sight)
     rate, image = np.zeros(count), np.zeros((count, len(seen)))
@@ -239,7 +239,7 @@ def _weights(before: np.ndarray, after: np.ndarray, step: float):
     They are of f at four instants, the interval's ends being the middle two, in what f adds to q:
     a cubic, its slopes being those of parabolas.
     """
-    change = np.max(np.abs(after - before)) * step
+    change = np.max(np.abs(after - before), initial=0.0) * step
     parts = max(1, int(np.ceil(np.sqrt(change / (8.0 * CHIRP)))))
     h, n = step / parts, 1.0 / parts
     turned, moments = np.ones((1, 1, 1)), [np.zeros((1, 1, 1))] * 4
