@@ -28,7 +28,7 @@ WIDE = 10.0  # times the slowest mode: a frequency axis longer than this is loga
 UNDAMPED = 1e-8  # of critical: a mode damped less has no steady amplitude
 ENDLESS = 1e6  # times the usual amplitude
 LEAST_SPLIT = 0.01  # [%]
-MOUNT_DASHES = ("-", DASHES[3])  # isolated, rigid
+MOUNT_DASHES = ("-", DASHES[3])  # in the order of LINES
 DECADES = 7.0  # of amplitude that colours tell apart
 NO_JITTER = f"no jitter: the rotors shake the bus by less than {NOISE:g} deg/s at every speed"
 
