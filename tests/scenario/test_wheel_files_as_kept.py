@@ -228,7 +228,7 @@ def test_reading_takes_a_time_linear_in_the_rows(put):
         return time.process_time() - start
 
     taken(10)  # units are made once
-    assert min(taken(20_000) for _ in range(3)) < 40 * taken(1000) + 2.0
+    assert min(taken(20_000) for _ in range(3)) < 40 * taken(1000) + 0.2
 
 
 def test_building_takes_a_time_linear_in_the_orders():
@@ -243,7 +243,7 @@ def test_building_takes_a_time_linear_in_the_orders():
         return time.process_time() - start
 
     taken(10)
-    assert min(taken(8000) for _ in range(3)) < 40 * taken(400) + 2.0
+    assert min(taken(8000) for _ in range(3)) < 40 * taken(400) + 0.2
 
 
 def test_damaged_files_never_end_in_a_traceback(put):
