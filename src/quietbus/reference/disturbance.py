@@ -3,8 +3,10 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from quietbus.reference.mechanism import Data, Mechanism, random_angles, seed_of, unit_data
+from quietbus.reference.mechanism import Mechanism
 from quietbus.reference.motion import Motion
+from quietbus.reference.platforms import Block, Data, blocks
+from quietbus.reference.units import random_angles, seed_of, unit_data
 
 COMPONENTS = ("radial_force", "axial_force", "radial_torque", "axial_torque")
 
@@ -14,19 +16,26 @@ class RotorLines:
 
     def __init__(self, data: Data, mechanism: Mechanism) -> None:
         self._mechanism = mechanism
-        tables = [unit["rotor"].get("disturbance") for unit in unit_data(data["cluster"])]
+        units = [unit for block in blocks(data) for unit in unit_data(block.data)]
+        tables = [unit["rotor"].get("disturbance") for unit in units]
         self._lines = [_lines(table, j) for j, table in enumerate(tables)]
         self._modes = [(table or {}).get("resonances", {}) for table in tables]
         self.any = any(self._lines)
-        self.noisy = any(any((table or {}).get("broadband", {}).values()) for table in tables)
 
-    def wrench(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
-        """Force [N] and torque [N m] about the plate's origin of all lines, plate axes."""
-        units, total = self._mechanism.units, np.zeros((2, 3))
+    def wrenches(self, motion: Motion, R_NX: np.ndarray) -> np.ndarray:
+        """Forces [N] and torques [N m] of all lines about each body's origin, inertial.
+
+        Args:
+            R_NX: (body, 3, 3) attitudes.
+
+        Returns:
+            (body, 2, 3)
+        """
+        units, total = self._mechanism.units, np.zeros((len(R_NX), 2, 3))
         for j, lines in enumerate(self._lines):
             speed, angle = motion.rotor_speed[j], motion.rotor_angle[j]
             turned = Rotation.from_rotvec([0.0, 0.0, motion.gimbal_angle[j]])
-            gimbal = units.axes_P[j] @ turned.as_matrix()
+            gimbal = units.axes_X[j] @ turned.as_matrix()
             x, y, z = (gimbal @ units.bearing_G[j]).T
             each = np.zeros((2, 3))
             for order, component, size, phase, sense in lines:
@@ -37,9 +46,10 @@ class RotorLines:
                 if component.startswith("radial"):
                     along = y * value.real + sense * z * value.imag
                 each[int(component.endswith("torque"))] += along
-            arm = units.position_P[j] + gimbal @ units.rotor_centre_G[j]
-            total += np.stack([each[0], each[1] + np.cross(arm, each[0])])
-        return total[0], total[1]
+            arm, host = units.position_X[j] + gimbal @ units.rotor_centre_G[j], units.host[j]
+            on_X = np.stack([each[0], each[1] + np.cross(arm, each[0])])
+            total[host] += on_X @ R_NX[host].T
+        return total
 
     def _passed(self, j: int, component: str, omega: float, sense: int, speed: float) -> complex:
         """Share of a line at the rotor that reaches the gimbal: an oscillator on its bearing."""
@@ -83,18 +93,36 @@ class GimbalLines:
     """Accelerations of the gimbals by their motors' ripple and steps."""
 
     def __init__(self, data: Data, mechanism: Mechanism) -> None:
-        cluster = data["cluster"]
-        self._motor = cluster.get("gimbal_motor")
-        if self._motor is None:
-            return
-        self._holding = self._motor.get("holding_bandwidth", 0.1 * cluster["gimbal_bandwidth"])
-        self._inertia = _about_gimbal(mechanism)
+        inertia = _about_gimbal(mechanism)
+        self._motors = [
+            (block.units, GimbalMotors(block, inertia[block.units]))
+            for block in blocks(data)
+            if "gimbal_motor" in block.data
+        ]
+
+    def acceleration(self, motion: Motion) -> np.ndarray:
+        """Of each gimbal [rad/s^2]."""
+        total = np.zeros(len(motion.gimbal_angle))
+        for units, motors in self._motors:
+            each = motors.acceleration(motion.gimbal_angle[units], motion.gimbal_rate[units])
+            total[units] = each
+        return total
+
+
+class GimbalMotors:
+    """Those of one block of CMGs."""
+
+    def __init__(self, block: Block, inertia: np.ndarray) -> None:
+        """``inertia``: (unit,) about the gimbal axes [kg m^2]."""
+        self._motor, self._inertia = block.data["gimbal_motor"], inertia
+        bandwidth = block.data["gimbal_bandwidth"]
+        self._holding = self._motor.get("holding_bandwidth", 0.1 * bandwidth)
         # phases (unit, line) of ripple and, last, of the steps
         said = [line["phase"] for line in self._motor.get("ripple", [])]
         said.append(self._motor["stepping"]["phase"] if "stepping" in self._motor else 0.0)
         drawn = [
             random_angles(seed_of(unit), j, 3, len(said))
-            for j, unit in enumerate(unit_data(cluster))
+            for j, unit in enumerate(unit_data(block.data), block.units.start)
         ]
         self._phase = np.array(
             [
@@ -103,17 +131,9 @@ class GimbalLines:
             ]
         )
 
-    @property
-    def any(self) -> bool:
-        """Whether the motors do anything beyond following their command."""
-        return self._motor is not None
-
-    def acceleration(self, motion: Motion) -> np.ndarray:
-        """Of each gimbal [rad/s^2]."""
-        total = np.zeros(len(motion.gimbal_angle))
-        if self._motor is None:
-            return total
-        angle, rate = motion.gimbal_angle, motion.gimbal_rate
+    def acceleration(self, angle: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        """Of each gimbal [rad/s^2] at its angle [rad] and rate [rad/s]."""
+        total = np.zeros(len(angle))
         for i, line in enumerate(self._motor.get("ripple", [])):
             n = line["per_turn"]
             omega2 = (n * rate) ** 2

@@ -4,7 +4,8 @@ import numpy as np
 from scipy.interpolate import PPoly
 from scipy.spatial.transform import Rotation
 
-from quietbus.reference.mechanism import Data, turn
+from quietbus.reference.mechanism import turn
+from quietbus.reference.platforms import Data
 
 
 class Guidance:

@@ -1,11 +1,11 @@
 """External forces and torques of a scenario (docs/scenario.md, `loads`)."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from quietbus.reference.mechanism import Data
-from quietbus.reference.multibody import Wrench
+from quietbus.reference.platforms import Data
 
 
 def share(profile: Any, t: float) -> float:
@@ -35,15 +35,23 @@ def corners(profile: Any) -> list[float]:
     return list(profile["table"]["times"])
 
 
-def wrench(loads: list[Data], t: float, R_NB: np.ndarray, R_NP: np.ndarray) -> Wrench:
-    """Sum of all loads at time t [s]."""
-    total = {"bus": np.zeros((2, 3)), "plate": np.zeros((2, 3))}
+def wrenches(loads: list[Data], t: float, names: Sequence[str], R_NX: np.ndarray) -> np.ndarray:
+    """Sum of all loads at time t [s].
+
+    Args:
+        names: of the bodies.
+        R_NX: (body, 3, 3) their attitudes.
+
+    Returns:
+        (body, 2, 3) forces [N] and torques [N m] about each body's origin, inertial.
+    """
+    total = np.zeros((len(names), 2, 3))
     for load in loads:
-        R_NX = R_NB if load["body"] == "bus" else R_NP
-        towards = R_NX if load["frame"] == "body" else np.eye(3)
+        body = names.index(load["body"])
+        towards = R_NX[body] if load["frame"] == "body" else np.eye(3)
         now = share(load["profile"], t)
         force = now * (towards @ np.array(load["force"]))
         torque = now * (towards @ np.array(load["torque"]))
-        lever = R_NX @ np.array(load["point"])
-        total[load["body"]] += np.stack([force, torque + np.cross(lever, force)])
-    return Wrench(*total["plate"], *total["bus"])
+        lever = R_NX[body] @ np.array(load["point"])
+        total[body] += np.stack([force, torque + np.cross(lever, force)])
+    return total

@@ -1,15 +1,15 @@
 """The satellite as a MuJoCo model.
 
-Bus and plate are free bodies, or the plate is welded to the bus (``mount: rigid``). Each CMG is a
-gimbal body on a hinge in the plate and a rotor on a hinge in the gimbal body; a huge armature on
-these hinges prescribes their motion while the motor's reaction still acts. Of reaction wheels the
+All bodies are free, or welded to the bus (``mount: rigid``). Each CMG is a gimbal body on a hinge
+in the body that carries it and a rotor on a hinge in the gimbal body; a huge armature on these
+hinges prescribes their motion while the motor's reaction still acts. Of reaction wheels the
 housing, without a hinge, is the gimbal body. The legs are
 
 - ``tendons``: massless struts between two points, exact for legs without mass and joint friction;
-- ``bodies``: trees on the bus, universal joint (hinge about the fixed axis k, hinge about the
-  moving axis y = k x s), lower part, slide along s, upper part. What holds a leg's tip to the
-  plate is a ``connect`` constraint, which is soft in MuJoCo: good for looking at the motion, with
-  errors of some 0.1 mm. ``quietbus.reference.multibody`` closes the legs exactly instead. The
+- ``bodies``: trees on the lower body, universal joint (hinge about the fixed axis k, hinge about
+  the moving axis y = k x s), lower part, slide along s, upper part. What holds a leg's tip to the
+  upper body is a ``connect`` constraint, which is soft in MuJoCo: good for looking at the motion,
+  with errors of some 0.1 mm. ``quietbus.reference.multibody`` closes the legs exactly instead. The
   friction of the spherical joints has no counterpart in the file.
 
 Loads and control are not part of the file; gimbals and rotors keep their rates, unless a torque of
@@ -22,7 +22,8 @@ from typing import Literal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from quietbus.reference.mechanism import LegParts, Mechanism, cross, unit
+from quietbus.reference.body import Body
+from quietbus.reference.mechanism import LegParts, Mechanism, apply, cross, unit
 from quietbus.reference.motion import Motion, matrix
 
 LegModel = Literal["tendons", "bodies"]
@@ -61,23 +62,18 @@ def write_mjcf(
     world = ET.SubElement(root, "worldbody")
     ET.SubElement(world, "light", pos="2 -2 4", dir="-0.4 0.4 -0.8", directional="true")
 
-    bus = _free_body(world, "bus", motion.p_NB_N, motion.q_NB)
-    _inertial(bus, mechanism.bus.mass, mechanism.bus.centre, mechanism.bus.inertia)
-    for i, joint in enumerate(mechanism.legs.lower_joint_B):
-        ET.SubElement(bus, "site", name=f"A{i}", pos=_text(joint), size="0.01")
-    if legs == "bodies":
-        _leg_bodies(bus, mechanism)
-    if mechanism.mount == "rigid":
-        pose = {"pos": _text(mechanism.p_BP_B), "quat": _matrix_quaternion(mechanism.R_BP)}
-        plate = ET.SubElement(bus, "body", pose | {"name": "plate"})
-    else:
-        plate = _free_body(world, "plate", motion.p_NP_N, motion.q_NP)
-    _inertial(plate, mechanism.plate.mass, mechanism.plate.centre, mechanism.plate.inertia)
-    for i, joint in enumerate(mechanism.legs.upper_joint_P):
-        ET.SubElement(plate, "site", name=f"U{i}", pos=_text(joint), size="0.01")
-    ET.SubElement(plate, "body", name="plate_origin")  # MuJoCo's xfrc_applied acts at its origin
-    _cluster(plate, mechanism)
-    _bus_and_plate_shapes(bus, plate, mechanism)
+    bodies = _bodies(world, mechanism, motion)
+    for i, (lower, upper) in enumerate(_of_legs(mechanism, bodies)):
+        for body, letter, joints in (
+            (lower, "A", mechanism.legs.lower_joint_Y),
+            (upper, "U", mechanism.legs.upper_joint_X),
+        ):
+            ET.SubElement(body, "site", name=f"{letter}{i}", pos=_text(joints[i]), size="0.01")
+        if legs == "bodies":
+            _leg_bodies(lower, mechanism, i)
+    for j, host in enumerate(mechanism.units.host):
+        _unit(bodies[host], mechanism, j)
+    _shapes(bodies, mechanism)
 
     if legs == "tendons":
         _tendons(root, mechanism)
@@ -112,19 +108,11 @@ def coordinates(mechanism: Mechanism, motion: Motion) -> dict[str, tuple[np.ndar
     Of a free joint: origin [m] and quaternion; velocity [m/s] in inertial and angular velocity
     [rad/s] in body components. Of hinges rad and rad/s, of slides m and m/s.
     """
-    values = {
-        "bus": (
-            np.concatenate([motion.p_NB_N, motion.q_NB]),
-            np.concatenate([motion.v_NB_N, motion.w_NB_B]),
-        ),
-        "plate": (
-            np.concatenate([motion.p_NP_N, motion.q_NP]),
-            np.concatenate([motion.v_NP_N, motion.w_NP_P]),
-        ),
-    }
+    poses, speeds = free_coordinates(motion)
+    values = {name: (poses[number], speeds[number]) for number, name in enumerate(mechanism.names)}
     for j in range(len(motion.rotor_angle)):
         one = slice(j, j + 1)
-        if not mechanism.units.wheels:
+        if not mechanism.units.wheel[j]:
             values[f"gimbal{j}"] = motion.gimbal_angle[one], motion.gimbal_rate[one]
         values[f"rotor{j}"] = motion.rotor_angle[one], motion.rotor_speed[one]
     positions, rates = leg_coordinates(mechanism, motion)
@@ -134,21 +122,31 @@ def coordinates(mechanism: Mechanism, motion: Motion) -> dict[str, tuple[np.ndar
     return values
 
 
+def free_coordinates(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (body, 7) and velocities (body, 6) of the bodies as MuJoCo has them."""
+    return (
+        np.concatenate([motion.p_NX_N, motion.q_NX], axis=1),
+        np.concatenate([motion.v_NX_N, motion.w_NX_X], axis=1),
+    )
+
+
 LEG_JOINTS = ("k", "y", "slide")
 
 
 def leg_coordinates(mechanism: Mechanism, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     """Positions and rates (leg, 3) of each leg's two hinges [rad] and slide [m].
 
-    They follow from where both plates are.
+    They follow from where both bodies are.
     """
-    R_NB, R_NP = matrix(motion.q_NB), matrix(motion.q_NP)
-    A, U = mechanism.legs.lower_joint_B, mechanism.legs.upper_joint_P
-    span = (motion.p_NP_N - motion.p_NB_N + U @ R_NP.T) @ R_NB - A
-    v_PU_N = motion.v_NP_N + cross(motion.w_NP_P, U) @ R_NP.T
-    # velocity of the leg's upper end as seen from the bus
-    rate = (v_PU_N - motion.v_NB_N) @ R_NB - cross(motion.w_NB_B, A + span)
-    k, (nominal, s0, y0) = mechanism.legs.axis_B, mechanism.nominal_legs
+    legs, R = mechanism.legs, matrix(motion.q_NX)
+    low, up = legs.lower_body, legs.upper_body
+    A, U, R_YN = legs.lower_joint_Y, legs.upper_joint_X, np.swapaxes(R[low], 1, 2)
+    top_N = motion.p_NX_N[up] + apply(R[up], U)
+    v_top_N = motion.v_NX_N[up] + apply(R[up], cross(motion.w_NX_X[up], U))
+    span = apply(R_YN, top_N - motion.p_NX_N[low]) - A
+    # velocity of the leg's upper end as seen from the lower body
+    rate = apply(R_YN, v_top_N - motion.v_NX_N[low]) - cross(motion.w_NX_X[low], A + span)
+    k, (nominal, s0, y0) = legs.axis_Y, mechanism.nominal_legs
     length, s = np.linalg.norm(span, axis=1), unit(span)
     y = unit(cross(k, s))
     about_k = _angle(y0, y, k)
@@ -163,45 +161,44 @@ def leg_coordinates(mechanism: Mechanism, motion: Motion) -> tuple[np.ndarray, n
     return np.stack([about_k, about_y, slide], axis=1), joint_rates
 
 
-def _leg_bodies(bus: ET.Element, mechanism: Mechanism) -> None:
-    """Legs as trees on the bus; all joint positions are zero in the plate's nominal pose."""
-    legs = mechanism.legs
-    for i, span_B in enumerate(mechanism.spans_B):
-        length, k = float(np.linalg.norm(span_B)), legs.axis_B[i]
-        frame = _leg_frame(k, span_B)
-        friction = repr(float(legs.universal_friction[i]))
-        lower = ET.SubElement(
-            bus,
-            "body",
-            name=f"lower{i}",
-            pos=_text(legs.lower_joint_B[i]),
-            quat=_matrix_quaternion(frame),
-        )
-        for joint, axis in (("k", frame.T @ k), ("y", np.array([0.0, 1.0, 0.0]))):
-            ET.SubElement(
-                lower,
-                "joint",
-                name=f"leg{i}_{joint}",
-                type="hinge",
-                axis=_text(axis),
-                damping=friction,
-            )
-        _leg_part(lower, legs.lower, i, 1.0)
-        _shape(lower, "lower", "capsule", fromto=f"0 0 0 0 0 {0.55 * length}", size="0.016")
-        upper = ET.SubElement(lower, "body", name=f"upper{i}", pos=_text([0.0, 0.0, length]))
+def _leg_bodies(body: ET.Element, mechanism: Mechanism, i: int) -> None:
+    """Leg i as a tree on its lower body; all joint positions are zero in the nominal pose."""
+    legs, span = mechanism.legs, mechanism.spans_Y[i]
+    length, k = float(np.linalg.norm(span)), legs.axis_Y[i]
+    frame = _leg_frame(k, span)
+    friction = repr(float(legs.universal_friction[i]))
+    lower = ET.SubElement(
+        body,
+        "body",
+        name=f"lower{i}",
+        pos=_text(legs.lower_joint_Y[i]),
+        quat=_matrix_quaternion(frame),
+    )
+    for joint, axis in (("k", frame.T @ k), ("y", np.array([0.0, 1.0, 0.0]))):
         ET.SubElement(
-            upper,
+            lower,
             "joint",
-            name=f"leg{i}_slide",
-            type="slide",
-            axis="0 0 1",
-            stiffness=repr(float(legs.stiffness[i])),
-            damping=repr(float(legs.damping[i])),
-            springref=repr(float(legs.free_length[i] - length)),
+            name=f"leg{i}_{joint}",
+            type="hinge",
+            axis=_text(axis),
+            damping=friction,
         )
-        _leg_part(upper, legs.upper, i, -1.0)
-        ET.SubElement(upper, "site", name=f"tip{i}", size="0.01")
-        _shape(upper, "upper", "capsule", fromto=f"0 0 0 0 0 {-0.55 * length}", size="0.01")
+    _leg_part(lower, legs.lower, i, 1.0)
+    _shape(lower, "lower", "capsule", fromto=f"0 0 0 0 0 {0.55 * length}", size="0.016")
+    upper = ET.SubElement(lower, "body", name=f"upper{i}", pos=_text([0.0, 0.0, length]))
+    ET.SubElement(
+        upper,
+        "joint",
+        name=f"leg{i}_slide",
+        type="slide",
+        axis="0 0 1",
+        stiffness=repr(float(legs.stiffness[i])),
+        damping=repr(float(legs.damping[i])),
+        springref=repr(float(legs.free_length[i] - length)),
+    )
+    _leg_part(upper, legs.upper, i, -1.0)
+    ET.SubElement(upper, "site", name=f"tip{i}", size="0.01")
+    _shape(upper, "upper", "capsule", fromto=f"0 0 0 0 0 {-0.55 * length}", size="0.01")
 
 
 def _leg_part(body: ET.Element, parts: LegParts, i: int, side: float) -> None:
@@ -210,7 +207,8 @@ def _leg_part(body: ET.Element, parts: LegParts, i: int, side: float) -> None:
     along = max(float(parts.axial_inertia[i]), LEAST_MASS)
     centre = np.array([0.0, 0.0, side * float(parts.distance[i])])
     mass = max(float(parts.mass[i]), LEAST_MASS)
-    _inertial(body, mass, centre, np.diag([across, across, along]))
+    inertia = np.diag([across, across, along])
+    _inertial(body, Body(np.array([mass]), centre[None], inertia[None]), 0)
 
 
 def _tendons(root: ET.Element, mechanism: Mechanism) -> None:
@@ -230,54 +228,81 @@ def _tendons(root: ET.Element, mechanism: Mechanism) -> None:
         ET.SubElement(spatial, "site", site=f"U{i}")
 
 
-def _cluster(plate: ET.Element, mechanism: Mechanism) -> None:
+def _unit(body: ET.Element, mechanism: Mechanism, j: int) -> None:
+    """Unit j on the body that carries it."""
     units = mechanism.units
-    for j in range(len(units.speed)):
-        gimbal = ET.SubElement(
-            plate,
-            "body",
-            name=f"gimbal{j}",
-            pos=_text(units.position_P[j]),
-            quat=_matrix_quaternion(units.axes_P[j]),
-        )
-        if not units.wheels:
-            _hinge(gimbal, f"gimbal{j}", "0 0 1")
-        _inertial(gimbal, units.gimbal.mass[j], units.gimbal.centre[j], units.gimbal.inertia[j])
-        _shape(gimbal, "gimbal", "cylinder", fromto="0 0 -0.12 0 0 0.12", size="0.02")
-        rotor = ET.SubElement(
-            gimbal,
-            "body",
-            name=f"rotor{j}",
-            pos=_text(units.rotor_centre_G[j]),
-            quat=_matrix_quaternion(units.bearing_G[j]),
-        )
-        _hinge(rotor, f"rotor{j}", "1 0 0")
-        _inertial(rotor, units.rotor.mass[j], units.rotor.centre[j], units.rotor.inertia[j])
-        _shape(rotor, "rotor", "cylinder", fromto="-0.02 0 0 0.02 0 0", size="0.08")
+    gimbal = ET.SubElement(
+        body,
+        "body",
+        name=f"gimbal{j}",
+        pos=_text(units.position_X[j]),
+        quat=_matrix_quaternion(units.axes_X[j]),
+    )
+    if not units.wheel[j]:
+        _hinge(gimbal, f"gimbal{j}", "0 0 1")
+    _inertial(gimbal, units.gimbal, j)
+    _shape(gimbal, "gimbal", "cylinder", fromto="0 0 -0.12 0 0 0.12", size="0.02")
+    rotor = ET.SubElement(
+        gimbal,
+        "body",
+        name=f"rotor{j}",
+        pos=_text(units.rotor_centre_G[j]),
+        quat=_matrix_quaternion(units.bearing_G[j]),
+    )
+    _hinge(rotor, f"rotor{j}", "1 0 0")
+    _inertial(rotor, units.rotor, j)
+    _shape(rotor, "rotor", "cylinder", fromto="-0.02 0 0 0.02 0 0", size="0.08")
 
 
-def _bus_and_plate_shapes(bus: ET.Element, plate: ET.Element, mechanism: Mechanism) -> None:
-    """A box with the universal joints on its faces, and a disk under the spherical joints."""
-    half = np.maximum(np.abs(mechanism.legs.lower_joint_B).max(axis=0), 0.1)
-    _shape(bus, "bus", "box", size=_text(half))
-    radius = np.linalg.norm(mechanism.legs.upper_joint_P, axis=1).max()
-    _shape(plate, "plate", "cylinder", size=_text([radius, 0.01]))
+def _shapes(bodies: list[ET.Element], mechanism: Mechanism) -> None:
+    """A box with the universal joints on the bus's faces, disks under the spherical joints."""
+    legs = mechanism.legs
+    half = np.maximum(np.abs(legs.lower_joint_Y[legs.lower_body == 0]).max(axis=0), 0.1)
+    _shape(bodies[0], "bus", "box", size=_text(half))
+    for number in np.unique(legs.upper_body):
+        tops = legs.upper_joint_X[legs.upper_body == number]
+        radius = np.linalg.norm(tops, axis=1).max()
+        _shape(bodies[number], "plate", "cylinder", size=_text([radius, 0.01]))
 
 
-def _free_body(world: ET.Element, name: str, p_NX_N: object, q_NX: object) -> ET.Element:
-    body = ET.SubElement(world, "body", name=name, pos=_text(p_NX_N), quat=_text(q_NX))
-    ET.SubElement(body, "freejoint", name=name)
-    return body
+def _bodies(world: ET.Element, mechanism: Mechanism, motion: Motion) -> list[ET.Element]:
+    """All bodies: free in the world, or welded to the bus."""
+    found: list[ET.Element] = []
+    for number, name in enumerate(mechanism.names):
+        if mechanism.welded[number]:
+            pose = {
+                "pos": _text(mechanism.p_BX_B[number]),
+                "quat": _matrix_quaternion(mechanism.R_BX[number]),
+            }
+            body = ET.SubElement(found[0], "body", pose | {"name": name})
+        else:
+            pose = {"pos": _text(motion.p_NX_N[number]), "quat": _text(motion.q_NX[number])}
+            body = ET.SubElement(world, "body", pose | {"name": name})
+            ET.SubElement(body, "freejoint", name=name)
+        _inertial(body, mechanism.bodies, number)
+        # MuJoCo's xfrc_applied acts at a mass centre: that of this empty body is the origin
+        ET.SubElement(body, "body", name=f"{name}_origin")
+        found.append(body)
+    return found
+
+
+def _of_legs(mechanism: Mechanism, bodies: list[ET.Element]) -> list[tuple[ET.Element, ET.Element]]:
+    """Lower and upper body of each leg."""
+    legs = mechanism.legs
+    return [
+        (bodies[low], bodies[up]) for low, up in zip(legs.lower_body, legs.upper_body, strict=True)
+    ]
 
 
 def _hinge(body: ET.Element, name: str, axis: str) -> None:
     ET.SubElement(body, "joint", name=name, type="hinge", axis=axis, armature=repr(ARMATURE))
 
 
-def _inertial(body: ET.Element, mass: object, centre: object, inertia: object) -> None:
-    I = np.asarray(inertia)
+def _inertial(element: ET.Element, body: Body, number: int) -> None:
+    I = body.inertia[number]
     six = [I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]]
-    ET.SubElement(body, "inertial", pos=_text(centre), mass=_text([mass]), fullinertia=_text(six))
+    where, mass = _text(body.centre[number]), _text([body.mass[number]])
+    ET.SubElement(element, "inertial", pos=where, mass=mass, fullinertia=_text(six))
 
 
 def _shape(body: ET.Element, color: str, kind: str, **where: str) -> None:

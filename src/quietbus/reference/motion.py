@@ -6,22 +6,18 @@ from typing import Self
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from quietbus.reference.mechanism import Mechanism
+from quietbus.reference.mechanism import Mechanism, apply
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Positions and velocities of bus, plate and units, and the controller's memory."""
+    """Positions and velocities of bodies (the bus first) and units, and the controller's memory."""
 
-    p_NB_N: np.ndarray  # (3,) [m]
-    q_NB: np.ndarray  # (4,) scalar first
-    p_NP_N: np.ndarray  # (3,) [m]
-    q_NP: np.ndarray  # (4,)
-    v_NB_N: np.ndarray  # (3,) [m/s]
-    w_NB_B: np.ndarray  # (3,) [rad/s]
-    v_NP_N: np.ndarray  # (3,) [m/s]
-    w_NP_P: np.ndarray  # (3,) [rad/s]
-    gimbal_angle: np.ndarray  # (unit,) [rad]
+    p_NX_N: np.ndarray  # (body, 3) [m]
+    q_NX: np.ndarray  # (body, 4) scalar first
+    v_NX_N: np.ndarray  # (body, 3) [m/s]
+    w_NX_X: np.ndarray  # (body, 3) [rad/s]
+    gimbal_angle: np.ndarray  # (unit,) [rad]; of wheels as they stand
     gimbal_rate: np.ndarray  # (unit,) [rad/s]
     rotor_angle: np.ndarray  # (unit,) [rad]
     rotor_speed: np.ndarray  # (unit,) [rad/s]
@@ -29,52 +25,64 @@ class Motion:
 
     def as_vector(self) -> np.ndarray:
         """All numbers in a row."""
-        return np.concatenate(list(vars(self).values()))
+        return np.concatenate([value.ravel() for value in vars(self).values()])
 
     def from_vector(self, vector: np.ndarray) -> Self:
         """A motion of the same shape from such a row."""
         parts, start = {}, 0
         for name, value in vars(self).items():
-            parts[name] = vector[start : start + len(value)]
-            start += len(value)
+            parts[name] = vector[start : start + value.size].reshape(value.shape)
+            start += value.size
         return type(self)(**parts)
 
 
 def matrix(q: np.ndarray) -> np.ndarray:
-    """Rotation matrix of a quaternion, scalar first, of any length."""
+    """Rotation matrices of quaternions, scalar first, of any length."""
     return Rotation.from_quat(q, scalar_first=True).as_matrix()
 
 
 def quaternion(R: Rotation) -> np.ndarray:
-    """Unit quaternion, scalar first."""
+    """Unit quaternions, scalar first."""
     return R.as_quat(scalar_first=True)
 
 
-def with_plate(
+def placed(
     mechanism: Mechanism,
     motion: Motion,
+    which: np.ndarray,
     displacement_B: np.ndarray | None = None,
     turn_B: np.ndarray | None = None,
     velocity_B: np.ndarray | None = None,
     rate_B: np.ndarray | None = None,
 ) -> Motion:
-    """The motion with the plate's set relative to the bus; by default it rides on it in its place.
+    """The motion with some bodies set relative to the bus; by default they ride in their places.
 
     Args:
-        displacement_B, turn_B: (3,) from the nominal pose [m], rotation vector [rad].
-        velocity_B, rate_B: (3,) of the plate's origin [m/s] and angular [rad/s], seen from the bus.
+        which: (body,) the bodies, n of them.
+        displacement_B, turn_B: (n, 3) from the nominal pose [m], rotation vector [rad].
+        velocity_B, rate_B: (n, 3) of origins [m/s] and angular [rad/s], seen from the bus.
     """
-    zero = np.zeros(3)
+    if not np.any(which):
+        return motion
+    zero = np.zeros((np.count_nonzero(which), 3))
     displacement, turn, velocity, rate = (
         zero if given is None else given for given in (displacement_B, turn_B, velocity_B, rate_B)
     )
-    bus = Rotation.from_quat(motion.q_NB, scalar_first=True)
-    R_BP = Rotation.from_rotvec(turn) * Rotation.from_matrix(mechanism.R_BP)
-    p_BP_B = mechanism.p_BP_B + displacement
-    return replace(
-        motion,
-        p_NP_N=motion.p_NB_N + bus.apply(p_BP_B),
-        q_NP=quaternion(bus * R_BP),
-        v_NP_N=motion.v_NB_N + bus.apply(np.cross(motion.w_NB_B, p_BP_B) + velocity),
-        w_NP_P=R_BP.inv().apply(motion.w_NB_B + rate),
-    )
+    bus = Rotation.from_quat(motion.q_NX[0], scalar_first=True)
+    R_BX = Rotation.from_rotvec(turn) * Rotation.from_matrix(mechanism.R_BX[which])
+    p_BX_B, w_NB_B = mechanism.p_BX_B[which] + displacement, motion.w_NX_X[0]
+    set_to = {
+        "p_NX_N": motion.p_NX_N[0] + bus.apply(p_BX_B),
+        "q_NX": quaternion(bus * R_BX),
+        "v_NX_N": motion.v_NX_N[0] + bus.apply(np.cross(w_NB_B, p_BX_B) + velocity),
+        "w_NX_X": apply(R_BX.inv().as_matrix(), w_NB_B + rate),
+    }
+    changed = {name: getattr(motion, name).copy() for name in set_to}
+    for name, value in set_to.items():
+        changed[name][which] = value
+    return replace(motion, **changed)
+
+
+def beside_bus(mechanism: Mechanism) -> np.ndarray:
+    """(body,) which bodies are not the bus."""
+    return np.arange(len(mechanism.names)) > 0

@@ -1,13 +1,14 @@
 """Accelerations and joint forces by MuJoCo's multibody algorithms, legs as bodies.
 
-MuJoCo gives the mass matrix, the bias force, passive forces and Jacobians of two trees of bodies
-(plate, gimbals and rotors; bus and both parts of each leg). Its soft constraints are not used: what
-ties the trees together is solved here exactly. The constraints on the joint accelerations a are
+MuJoCo gives the mass matrix, the bias force, passive forces and Jacobians of trees of bodies: each
+free body with its gimbals and rotors, and both parts of each leg that stands on it. Its soft
+constraints are not used: what ties the trees together is solved here exactly. The constraints on
+the joint accelerations a are
 
     (J_tip - J_U) a = -(dJ_tip/dt - dJ_U/dt) v     each leg's tip stays in its spherical joint
     a_gimbal = given,  a_rotor = given             the servos; 0 for rotors of constant speed
 
-The legs' own joints follow the plates: with ``a = a0 + N x``, x the accelerations of bus and plate,
+The legs' own joints follow the bodies: with ``a = a0 + N x``, x the accelerations of free bodies,
 ``N^T M N x = N^T (f - M a0)``, since the constraint forces do no virtual work. What is then missing
 in ``M a = f`` is theirs: the forces in the spherical joints and the motors' torques.
 """
@@ -18,28 +19,21 @@ import numpy as np
 
 from quietbus.reference.engine import import_mujoco
 from quietbus.reference.mechanism import Mechanism
-from quietbus.reference.mjcf import LEG_JOINTS, leg_coordinates, write_mjcf
+from quietbus.reference.mjcf import (
+    LEG_JOINTS,
+    free_coordinates,
+    leg_coordinates,
+    write_mjcf,
+)
 from quietbus.reference.motion import Motion
 
 
 @dataclass(frozen=True)
-class Wrench:
-    """External forces [N] and torques [N m] on plate (about P) and bus (about B), inertial."""
-
-    force_P: np.ndarray
-    torque_P: np.ndarray
-    force_B: np.ndarray
-    torque_B: np.ndarray
-
-
-@dataclass(frozen=True)
 class Accelerations:
-    """Of plate and bus, inertial components, and what the constraints need for them."""
+    """Of all bodies, inertial components, and what the constraints need for them."""
 
-    v_P: np.ndarray  # (3,) [m/s^2]
-    w_P: np.ndarray  # (3,) [rad/s^2]
-    v_B: np.ndarray
-    w_B: np.ndarray
+    v: np.ndarray  # (body, 3) [m/s^2] of their origins
+    w: np.ndarray  # (body, 3) [rad/s^2]
     joints: np.ndarray  # (nv,) of all joints of the model
     constraint: np.ndarray  # (nv,) generalised forces of the constraints
 
@@ -48,9 +42,9 @@ class Accelerations:
 class JointForces:
     """What the joints exert on each leg, inertial components."""
 
-    spherical_force: np.ndarray  # (leg, 3) [N] plate on upper part
-    universal_force: np.ndarray  # (leg, 3) [N] base on lower part
-    universal_moment: np.ndarray  # (leg,) [N m] base on lower part, about the axis
+    spherical_force: np.ndarray  # (leg, 3) [N] upper body on upper part
+    universal_force: np.ndarray  # (leg, 3) [N] lower body on lower part
+    universal_moment: np.ndarray  # (leg,) [N m] lower body on lower part, about the axis
     universal_axis: np.ndarray  # (leg, 3) normal to both axes of the joint, on the leg's side
 
 
@@ -68,82 +62,78 @@ class Multibody:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
         self._data = mujoco.MjData(model)
         self._legs = range(len(mechanism.legs.stiffness))
-        units = range(len(mechanism.units.speed))
-        self._rigid = mechanism.mount == "rigid"
 
         def addresses(names: list[str], width: int = 1) -> tuple[np.ndarray, np.ndarray]:
             q = [model.joint(name).qposadr[0] for name in names]
             v = [model.joint(name).dofadr[0] for name in names]
             more = 1 if width == 6 else 0  # a quaternion has four numbers for three freedoms
             return (
-                np.concatenate([np.arange(start, start + width + more) for start in q]),
-                np.concatenate([np.arange(start, start + width) for start in v]),
+                np.array([np.arange(start, start + width + more) for start in q], int).ravel(),
+                np.array([np.arange(start, start + width) for start in v], int).ravel(),
             )
 
         self._leg = addresses([f"leg{i}_{name}" for i in self._legs for name in LEG_JOINTS])
-        self._rotor = addresses([f"rotor{j}" for j in units])
-        nothing = np.zeros(0, int)
-        self._gimbal = (nothing, nothing)
-        if not mechanism.units.wheels:
-            self._gimbal = addresses([f"gimbal{j}" for j in units])
-        self._free = addresses(["bus"] if self._rigid else ["bus", "plate"], 6)
+        units = mechanism.units
+        self._rotor = addresses([f"rotor{j}" for j in range(len(units.wheel))])
+        self._gimballed = np.flatnonzero(~units.wheel)
+        self._gimbal = addresses([f"gimbal{j}" for j in self._gimballed])
+        self._free_bodies = np.flatnonzero(~mechanism.welded)
+        self._free = addresses([mechanism.names[number] for number in self._free_bodies], 6)
 
     def set(self, motion: Motion) -> None:
-        """Bring the model to a motion; its legs have to reach the plate and follow it."""
+        """Bring the model to a motion; its legs have to reach their bodies and follow them."""
         model, data = self._model, self._data
         angles, rates = leg_coordinates(self.mechanism, motion)
-        poses = [motion.p_NB_N, motion.q_NB, motion.p_NP_N, motion.q_NP]
-        speeds = [motion.v_NB_N, motion.w_NB_B, motion.v_NP_N, motion.w_NP_P]
-        data.qpos[self._free[0]] = np.concatenate(poses[:2] if self._rigid else poses)
-        data.qvel[self._free[1]] = np.concatenate(speeds[:2] if self._rigid else speeds)
+        poses, speeds = free_coordinates(motion)
+        data.qpos[self._free[0]] = poses[self._free_bodies].ravel()
+        data.qvel[self._free[1]] = speeds[self._free_bodies].ravel()
         data.qpos[self._leg[0]], data.qvel[self._leg[1]] = angles.ravel(), rates.ravel()
         data.qpos[self._rotor[0]] = motion.rotor_angle
         data.qvel[self._rotor[1]] = motion.rotor_speed
-        if not self.mechanism.units.wheels:
-            data.qpos[self._gimbal[0]] = motion.gimbal_angle
-            data.qvel[self._gimbal[1]] = motion.gimbal_rate
+        data.qpos[self._gimbal[0]] = motion.gimbal_angle[self._gimballed]
+        data.qvel[self._gimbal[1]] = motion.gimbal_rate[self._gimballed]
         self._mujoco.mj_fwdPosition(model, data)
         self._mujoco.mj_fwdVelocity(model, data)
         self._ends = [self._leg_end(i) for i in self._legs]
-        for i, (tip, on_plate) in enumerate(self._ends):
+        for i, (tip, joint) in enumerate(self._ends):
             gap = np.linalg.norm(data.site(f"tip{i}").xpos - data.site(f"U{i}").xpos)
-            gap_rate = np.linalg.norm((tip[0] - on_plate[0]) @ data.qvel)
-            if gap > 1e-9 or gap_rate > 1e-9 * (1.0 + np.linalg.norm(on_plate[0] @ data.qvel)):
+            gap_rate = np.linalg.norm((tip[0] - joint[0]) @ data.qvel)
+            if gap > 1e-9 or gap_rate > 1e-9 * (1.0 + np.linalg.norm(joint[0] @ data.qvel)):
                 raise RuntimeError(
-                    f"leg {i} of the MuJoCo model does not follow the plate: its tip is off by "
-                    f"{gap:.3g} m and {gap_rate:.3g} m/s"
+                    f"leg {i} of the MuJoCo model does not follow its upper body: its tip is off "
+                    f"by {gap:.3g} m and {gap_rate:.3g} m/s"
                 )
 
     def accelerations(
         self,
         gimbal_acceleration: np.ndarray,
         rotor_acceleration: np.ndarray,
-        wrench: Wrench,
+        wrenches: np.ndarray,
     ) -> Accelerations:
         """Accelerations at the motion that is set.
 
         Args:
             gimbal_acceleration, rotor_acceleration: (unit,) that the motors enforce [rad/s^2];
-                wheels have no gimbals.
-            wrench: external loads.
+                wheels' gimbals stand still.
+            wrenches: (body, 2, 3) external forces [N] and torques [N m] about each body's origin,
+                inertial.
         """
         model, data = self._model, self._data
-        force = data.qfrc_passive - data.qfrc_bias + self._friction() + self._loads(wrench)
+        force = data.qfrc_passive - data.qfrc_bias + self._friction() + self._loads(wrenches)
         M = np.zeros((model.nv, model.nv))
         self._mujoco.mj_fullM(model, data, M)
         legs, free = self._leg[1], self._free[1]
-        G = np.concatenate([tip[0] - on_plate[0] for tip, on_plate in self._ends])
-        bias = [(tip[1] - on_plate[1]) @ data.qvel for tip, on_plate in self._ends]
+        G = np.concatenate([tip[0] - joint[0] for tip, joint in self._ends])
+        bias = [(tip[1] - joint[1]) @ data.qvel for tip, joint in self._ends]
         follow = np.linalg.solve(G[:, legs], np.column_stack([-np.concatenate(bias), -G[:, free]]))
         a0, N = np.zeros(model.nv), np.zeros((model.nv, len(free)))
         a0[self._rotor[1]] = rotor_acceleration
-        if not self.mechanism.units.wheels:
-            a0[self._gimbal[1]] = gimbal_acceleration
+        a0[self._gimbal[1]] = gimbal_acceleration[self._gimballed]
         a0[legs], N[legs] = follow[:, 0], follow[:, 1:]
         N[free] = np.eye(len(free))
         a = a0 + N @ np.linalg.solve(N.T @ M @ N, N.T @ (force - M @ a0))
-        (v_P, w_P), (v_B, w_B) = (self._acceleration(name, a) for name in ("plate", "bus"))
-        return Accelerations(v_P, w_P, v_B, w_B, a, M @ a - force)
+        v, w = zip(*(self._acceleration(name, a) for name in self.mechanism.names), strict=True)
+        return Accelerations(np.array(v), np.array(w), a, M @ a - force)
 
     def rotor_torques(self, found: Accelerations) -> np.ndarray:
         """Torque (unit,) [N m] of each motor on its rotor about the spin axis."""
@@ -167,7 +157,7 @@ class Multibody:
         tips = np.zeros((len(self._legs), 3))
         data.qacc[:] = found.joints
         data.xfrc_applied[:] = 0.0
-        plate = self._rate_of("plate")
+        upper_bodies = [self.mechanism.names[number] for number in self.mechanism.legs.upper_body]
         for i in self._legs:
             own = self._leg[1][3 * i : 3 * i + 3]
             J_tip = self._ends[i][0][0][:, own]
@@ -175,7 +165,9 @@ class Multibody:
             upper = data.body(f"upper{i}")
             lever = data.site(f"tip{i}").xpos - upper.xipos
             c = float(self.mechanism.legs.spherical_friction[i])
-            torque = np.cross(lever, tips[i]) - c * (self._rate_of(f"upper{i}") - plate)
+            torque = np.cross(lever, tips[i]) - c * (
+                self._rate_of(f"upper{i}") - self._rate_of(upper_bodies[i])
+            )
             data.xfrc_applied[upper.id] = np.concatenate([tips[i], torque])
         self._mujoco.mj_rnePostConstraint(model, data)
         forces, moments, axes = np.zeros_like(tips), np.zeros(len(tips)), np.zeros_like(tips)
@@ -212,18 +204,16 @@ class Multibody:
         return Jw @ self._data.qvel
 
     def _leg_end(self, i: int) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
-        """Jacobians of leg i's tip and of its spherical joint on the plate."""
-        tip, on_plate = self._data.site(f"tip{i}").xpos, self._data.site(f"U{i}").xpos
-        upper, plate = self._model.body(f"upper{i}").id, self._model.body("plate").id
-        return self._jacobians(tip, upper), self._jacobians(on_plate, plate)
+        """Jacobians of leg i's tip and of its spherical joint on the upper body."""
+        tip, joint = self._data.site(f"tip{i}").xpos, self._data.site(f"U{i}").xpos
+        name = self.mechanism.names[self.mechanism.legs.upper_body[i]]
+        upper, body = self._model.body(f"upper{i}").id, self._model.body(name).id
+        return self._jacobians(tip, upper), self._jacobians(joint, body)
 
-    def _loads(self, wrench: Wrench) -> np.ndarray:
+    def _loads(self, wrenches: np.ndarray) -> np.ndarray:
         """Generalised force of the external loads."""
         total = np.zeros(self._model.nv)
-        for name, force, torque in (
-            ("bus", wrench.force_B, wrench.torque_B),
-            ("plate", wrench.force_P, wrench.torque_P),
-        ):
+        for name, (force, torque) in zip(self.mechanism.names, wrenches, strict=True):
             body = self._data.body(name)
             self._mujoco.mj_applyFT(
                 self._model, self._data, force, torque, body.xpos, body.id, total
@@ -233,10 +223,10 @@ class Multibody:
     def _friction(self) -> np.ndarray:
         """Generalised force of the spherical joints' friction; MuJoCo has that of the others."""
         force = np.zeros(self._model.nv)
-        for friction, (tip, on_plate) in zip(
+        for friction, (tip, joint) in zip(
             self.mechanism.legs.spherical_friction, self._ends, strict=True
         ):
-            Jw = tip[2] - on_plate[2]
+            Jw = tip[2] - joint[2]
             force -= float(friction) * Jw.T @ (Jw @ self._data.qvel)
         return force
 

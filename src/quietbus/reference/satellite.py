@@ -1,6 +1,5 @@
 """The scenario's satellite, controlled and loaded, by MuJoCo's equations of motion."""
 
-import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -10,9 +9,10 @@ from scipy.integrate import solve_ivp
 from quietbus.reference import loads
 from quietbus.reference.control import Control, Decisions
 from quietbus.reference.disturbance import GimbalLines, RotorLines
-from quietbus.reference.mechanism import Data, Mechanism, read_mechanism, turn
-from quietbus.reference.motion import Motion, matrix, quaternion, with_plate
-from quietbus.reference.multibody import Accelerations, JointForces, Multibody, Wrench
+from quietbus.reference.mechanism import Mechanism, apply, balanced, read_mechanism, turn
+from quietbus.reference.motion import Motion, beside_bus, matrix, placed, quaternion
+from quietbus.reference.multibody import Accelerations, JointForces, Multibody
+from quietbus.reference.platforms import Data
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Instant:
     stroke: np.ndarray  # (leg,) [m]
     strut_force: np.ndarray  # (leg,) [N]
     rotor_torque: np.ndarray  # (unit,) [N m]
-    joints: JointForces | None  # None: on a rigid mount the legs' forces are not determined
+    joints: JointForces | None  # None: on rigid mounts the legs' forces are not determined
 
 
 class ReferenceSatellite:
@@ -36,7 +36,7 @@ class ReferenceSatellite:
         self._data = data
         self.mechanism = read_mechanism(data)
         self.body = Multibody(self.mechanism, _as_one(self.mechanism))
-        self.control = Control(data, self.mechanism, _inertia_B(data))
+        self.control = Control(data, self.mechanism, _inertia_B(self.mechanism))
         self.rotor_lines = RotorLines(data, self.mechanism)
         self.gimbal_lines = GimbalLines(data, self.mechanism)
 
@@ -47,10 +47,9 @@ class ReferenceSatellite:
         return sorted({*found, *self.control.corners})
 
     def initial(self) -> Motion:
-        """The motion at t = 0: plate and bus moving as one, bus mass centre at rest at 0."""
-        run_up = self.control.run_up
-        speed = self.mechanism.units.speed if run_up is None else run_up.initial_speed
+        """The motion at t = 0: all bodies moving as one, bus mass centre at rest at 0."""
         start = self._data["initial"]
+        speed = self.control.prescribed(0.0)[1]
         return _as_one(self.mechanism, start["attitude"], start["rate"], speed)
 
     def at(self, t: float, motion: Motion, with_joints: bool = True) -> Instant:
@@ -58,27 +57,21 @@ class ReferenceSatellite:
         motion = self._riding(motion)
         decisions = self.control.decide(t, motion)
         gimbals = decisions.gimbal_acceleration + self.gimbal_lines.acceleration(motion)
-        R_NB, R_NP = matrix(motion.q_NB), matrix(motion.q_NP)
-        wrench = loads.wrench(self._data["loads"], t, R_NB, R_NP)
+        R_NX = matrix(motion.q_NX)
+        wrenches = loads.wrenches(self._data["loads"], t, self.mechanism.names, R_NX)
         if self.rotor_lines.any:
-            force, torque = (R_NP @ each for each in self.rotor_lines.wrench(motion))
-            on_P = (wrench.force_P + force, wrench.torque_P + torque)
-            wrench = Wrench(*on_P, wrench.force_B, wrench.torque_B)
+            wrenches = wrenches + self.rotor_lines.wrenches(motion, R_NX)
         self.body.set(motion)
-        found = self.body.accelerations(gimbals, decisions.rotor_acceleration, wrench)
-        isolated = self.mechanism.mount == "isolated"
+        found = self.body.accelerations(gimbals, decisions.rotor_acceleration, wrenches)
+        isolated = not np.any(self.mechanism.welded)
         return Instant(
             decisions,
             found,
             Motion(
-                p_NB_N=motion.v_NB_N,
-                q_NB=_quaternion_rate(motion.q_NB, motion.w_NB_B),
-                p_NP_N=motion.v_NP_N,
-                q_NP=_quaternion_rate(motion.q_NP, motion.w_NP_P),
-                v_NB_N=found.v_B,
-                w_NB_B=R_NB.T @ found.w_B,
-                v_NP_N=found.v_P,
-                w_NP_P=R_NP.T @ found.w_P,
+                p_NX_N=motion.v_NX_N,
+                q_NX=_quaternion_rate(motion.q_NX, motion.w_NX_X),
+                v_NX_N=found.v,
+                w_NX_X=apply(np.swapaxes(R_NX, 1, 2), found.w),
                 gimbal_angle=motion.gimbal_rate,
                 gimbal_rate=gimbals,
                 rotor_angle=motion.rotor_speed,
@@ -128,10 +121,9 @@ class ReferenceSatellite:
         return motions
 
     def _riding(self, motion: Motion) -> Motion:
-        """The motion with unit quaternions, and on a rigid mount with the plate on the bus."""
-        q_NB, q_NP = (q / np.linalg.norm(q) for q in (motion.q_NB, motion.q_NP))
-        motion = replace(motion, q_NB=q_NB, q_NP=q_NP)
-        return with_plate(self.mechanism, motion) if self.mechanism.mount == "rigid" else motion
+        """The motion with unit quaternions, and with welded bodies in their places."""
+        q_NX = motion.q_NX / np.linalg.norm(motion.q_NX, axis=1, keepdims=True)
+        return placed(self.mechanism, replace(motion, q_NX=q_NX), self.mechanism.welded)
 
 
 def _as_one(
@@ -140,47 +132,41 @@ def _as_one(
     rate: Sequence[float] = (0.0, 0.0, 0.0),
     speed: np.ndarray | float = 0.0,
 ) -> Motion:
-    """Plate and bus moving as one, gimbals and rotors at their angles of the start.
+    """All bodies moving as one, gimbals and rotors at their angles of the start.
 
     Args:
         attitude: [roll, pitch, yaw] of the bus [rad].
         rate: (3,) of the bus [rad/s], bus frame.
         speed: of the rotors [rad/s].
     """
-    units, zero = mechanism.units, np.zeros(3)
-    alone = Motion(
-        p_NB_N=zero,
-        q_NB=quaternion(turn(attitude)),
-        p_NP_N=zero,
-        q_NP=np.zeros(4),
-        v_NB_N=zero,
-        w_NB_B=np.array(rate, dtype=float),
-        v_NP_N=zero,
-        w_NP_P=zero,
+    units, zero = mechanism.units, np.zeros((len(mechanism.names), 3))
+    bus = Motion(
+        p_NX_N=zero,
+        q_NX=quaternion(turn(attitude)) * np.ones((len(zero), 1)),
+        v_NX_N=zero,
+        w_NX_X=zero + np.array(rate, dtype=float),
         gimbal_angle=units.gimbal_angle,
         gimbal_rate=np.zeros_like(units.phase),
         rotor_angle=units.phase,
         rotor_speed=speed * np.ones_like(units.phase),
-        error_integral=zero,
+        error_integral=np.zeros(3),
     )
-    return with_plate(mechanism, alone)
+    return placed(mechanism, bus, beside_bus(mechanism))
 
 
-def _inertia_B(data: Data) -> np.ndarray:
+def _inertia_B(mechanism: Mechanism) -> np.ndarray:
     """Inertia [kg m^2] of the whole satellite at its start about its mass centre, bus axes.
 
     With balanced rotors, as the control's designer knows it.
     """
-    cluster = copy.deepcopy(data["cluster"])
-    for rotor in [cluster["rotor"], *(unit.get("rotor", {}) for unit in cluster.get("units", []))]:
-        rotor.update(static_imbalance=0.0, dynamic_imbalance=0.0)
-    balanced = read_mechanism({**data, "cluster": cluster})
-    body = Multibody(balanced, _as_one(balanced))
-    body.set(_as_one(balanced))
+    start = _as_one(mechanism)
+    body = Multibody(balanced(mechanism), start)
+    body.set(start)
     return body.inertia()
 
 
 def _quaternion_rate(q: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """Of an attitude whose body turns at w [rad/s] about its own axes."""
-    scalar, vector = q[0], q[1:]
-    return 0.5 * np.concatenate([[-vector @ w], scalar * w + np.cross(vector, w)])
+    """Of attitudes (body, 4) whose bodies turn at w (body, 3) [rad/s] about their own axes."""
+    scalar, vector = q[:, :1], q[:, 1:]
+    along = -np.sum(vector * w, axis=1, keepdims=True)
+    return 0.5 * np.concatenate([along, scalar * w + np.cross(vector, w)], axis=1)

@@ -23,7 +23,7 @@ from quietbus.reference.motion import Motion
 from quietbus.solve.direct import Scheme, Solution, Tolerances, integrate
 from quietbus.validate.subject import Check, Subject, apart
 from quietbus.validate.trajectory import fly, lossless
-from quietbus.validate.translate import state_of
+from quietbus.validate.translate import BUS, PLATE, state_of
 
 TOLERANCES = Tolerances(1e-11, 1e-13)
 SAMPLES = 20  # beside the start
@@ -66,14 +66,14 @@ def check_flight(subject: Subject, flight: Flight) -> Check:
     at = [reference.at(t, m) for t, m in zip(flight.times, flight.theirs, strict=True)]
     moved = {name: np.array([vars(m)[name] for m in flight.theirs]) for name in vars(at[0].rates)}
     theirs = {
-        "bus_position": moved["p_NB_N"],
-        "bus_velocity": moved["v_NB_N"],
-        "bus_attitude": moved["q_NB"],
-        "bus_rate": moved["w_NB_B"],
-        "platform_position": moved["p_NP_N"] - moved["p_NB_N"],
-        "platform_velocity": moved["v_NP_N"],
-        "platform_attitude": moved["q_NP"],
-        "platform_rate": moved["w_NP_P"],
+        "bus_position": moved["p_NX_N"][:, BUS],
+        "bus_velocity": moved["v_NX_N"][:, BUS],
+        "bus_attitude": moved["q_NX"][:, BUS],
+        "bus_rate": moved["w_NX_X"][:, BUS],
+        "platform_position": moved["p_NX_N"][:, PLATE] - moved["p_NX_N"][:, BUS],
+        "platform_velocity": moved["v_NX_N"][:, PLATE],
+        "platform_attitude": moved["q_NX"][:, PLATE],
+        "platform_rate": moved["w_NX_X"][:, PLATE],
         "gimbal_angle": moved["gimbal_angle"],
         "gimbal_rate": moved["gimbal_rate"],
         "leg_stroke": np.array([i.stroke for i in at]),

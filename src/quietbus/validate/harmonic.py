@@ -12,6 +12,8 @@ from quietbus.dynamics.state import State
 from quietbus.dynamics.vibration import Vibration
 from quietbus.model.disturbance import orders_of
 from quietbus.model.satellite import Satellite
+from quietbus.reference.platforms import blocks
+from quietbus.reference.units import unit_data
 from quietbus.solve.direct import SLOW, Tolerances
 from quietbus.solve.harmonic import (
     HarmonicSolution,
@@ -21,7 +23,7 @@ from quietbus.solve.harmonic import (
 )
 from quietbus.validate.flight import SAMPLES, Flight, ended
 from quietbus.validate.subject import Check, Subject, apart
-from quietbus.validate.translate import motion_of, state_of
+from quietbus.validate.translate import BUS, PLATE, motion_of, state_of
 
 SMALL = 1e-9  # [rad] turn of the bus by all lines: what is of second order does not count
 TURNS = 8  # of the slowest rotor
@@ -54,7 +56,7 @@ def _in_motion(subject: Subject, flight: Flight, run: HarmonicSolution) -> Check
         states = run.slow.states
         amplitude = run.jitter.amplitudes["bus_rate"]
         lines = _in_time(subject.satellite, flight.times, states, amplitude)
-        theirs = np.array([motion.w_NB_B for motion in flight.theirs])
+        theirs = np.array([motion.w_NX_X[BUS] for motion in flight.theirs])
         off = np.asarray(run.slow.outputs.bus_rate) + lines - theirs
         error = float(np.max(np.linalg.norm(off, axis=1)) / _size(amplitude))
     return Check(
@@ -87,8 +89,8 @@ def _at_rest(subject: Subject, piece: float, steady: bool) -> list[Check]:
         start = motion_of(satellite, on_periodic_solution(satellite, state_of(satellite, start)))
     motions = reference.fly(start, times, 1e-10, 1e-16)
     theirs = {
-        "bus_rate": np.array([motion.w_NB_B for motion in motions]),
-        "platform_rate": np.array([motion.w_NP_P for motion in motions]),
+        "bus_rate": np.array([motion.w_NX_X[BUS] for motion in motions]),
+        "platform_rate": np.array([motion.w_NX_X[PLATE] for motion in motions]),
     }
     error = np.nan
     if not ended(run.slow, len(times)):
@@ -164,18 +166,19 @@ def _rest(data: dict[str, Any]) -> None:
         load["force"] = load["torque"] = [0.0] * 3
     data["initial"] = {"attitude": [0.0] * 3, "rate": [0.0] * 3, "steady": False}
     data["target"]["attitude"] = [0.0] * 3
-    cluster = data["cluster"]
-    cluster.pop("gimbal_motor", None)
-    if "run_up" in cluster:
-        own = cluster.get("units") or [{}] * cluster["pyramid"]["units"]
-        speeds = [unit.get("rotor", {}).get("speed", cluster["rotor"]["speed"]) for unit in own]
-        cluster["run_up"].update(initial_speed=speeds, final_speed=speeds)
+    for block in blocks(data):
+        cluster: Any = block.data
+        cluster.pop("gimbal_motor", None)
+        if "run_up" in cluster:
+            speeds = [unit["rotor"]["speed"] for unit in unit_data(cluster)]
+            cluster["run_up"].update(initial_speed=speeds, final_speed=speeds)
 
 
 def _scale(data: dict[str, Any], scale: float) -> None:
     """Scale the lines of all rotors."""
-    cluster = data["cluster"]
-    for rotor in [cluster["rotor"], *(unit.get("rotor", {}) for unit in cluster.get("units", []))]:
+    clusters = [block.data for block in blocks(data)]
+    units = [unit for cluster in clusters for unit in cluster.get("units", [])]
+    for rotor in [each["rotor"] for each in [*clusters, *units] if "rotor" in each]:
         for lines in [rotor, *((rotor.get("disturbance") or {}).get("orders") or [])]:
             for key in _LINES.intersection(lines):
                 lines[key] *= scale

@@ -49,7 +49,7 @@ def check_instants(subject: Subject, count: int, rng: np.random.Generator) -> li
         Check(
             "accelerations",
             f"{said}: legs with mass and joint friction, control, motors and loads at work",
-            _each(_accelerations(theirs), ours[0]),
+            _each(_accelerations(theirs, reference.mechanism.names), ours[0]),
             1e-9 + _rounding(subject),
         ),
         Check(
@@ -98,7 +98,8 @@ def _evaluated(satellite, times, states):
         _, a = evaluate(satellite, t, state)
         signals, rate = control_signals(satellite, t, state), state_rate(satellite, t, state)
         found = outputs(satellite, t, state, with_joint_forces=satellite.mount == "isolated")
-        accelerations = {"v_P": a.v_P, "w_P": a.w_P, "v_B": a.v_B, "w_B": a.w_B}
+        accelerations = {"v of bus": a.v_B, "w of bus": a.w_B}
+        accelerations |= {"v of plate": a.v_P, "w of plate": a.w_P}
         decisions = {
             "attitude_error": signals.attitude_error_B,
             "torque": signals.torque_B,
@@ -108,8 +109,8 @@ def _evaluated(satellite, times, states):
             if rate.rotor is None
             else rate.rotor.speed,
             "singularity": found.singularity_measure,
-            "q_NB": rate.q_NB,
-            "q_NP": rate.q_NP,
+            "torque_share": jnp.ones(()) if signals.torque_share is None else signals.torque_share,
+            "q_NX": jnp.stack([rate.q_NB, rate.q_NP]),
         }
         reported = {"stroke": found.leg_stroke, "strut_force": found.leg_force}
         if found.rotor_torque is not None:
@@ -129,21 +130,22 @@ def _each(theirs: Sequence[dict], ours: dict, least: float = 1e-300) -> float:
     return float(np.max(errors))
 
 
-def _accelerations(theirs: Sequence[Instant]) -> list[dict]:
+def _accelerations(theirs: Sequence[Instant], names: Sequence[str]) -> list[dict]:
     return [
-        {name: getattr(at.accelerations, name) for name in ("v_P", "w_P", "v_B", "w_B")}
+        {f"v of {name}": each for name, each in zip(names, at.accelerations.v, strict=True)}
+        | {f"w of {name}": each for name, each in zip(names, at.accelerations.w, strict=True)}
         for at in theirs
     ]
 
 
 def _decisions(theirs: Sequence[Instant]) -> list[dict]:
-    names = ("attitude_error", "torque", "integral_rate", "rotor_acceleration", "singularity")
+    names = ["attitude_error", "torque", "integral_rate", "rotor_acceleration"]
+    names += ["singularity", "torque_share"]
     return [
         {name: getattr(at.decisions, name) for name in names}
         | {
             "gimbal_acceleration": at.rates.gimbal_rate,
-            "q_NB": at.rates.q_NB,
-            "q_NP": at.rates.q_NP,
+            "q_NX": at.rates.q_NX,
         }
         for at in theirs
     ]

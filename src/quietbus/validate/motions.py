@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from quietbus.reference.motion import Motion, quaternion, with_plate
+from quietbus.reference.motion import Motion, beside_bus, placed, quaternion
 from quietbus.reference.satellite import ReferenceSatellite
 
-FASTEST = 600.0  # [rad/s] of rotors whose speeds change and have no limit
+FASTEST = 600.0  # [rad/s] of wheels that have no limit of speed
 
 
 def random_times(
@@ -44,42 +44,41 @@ def random_motion(
     if near is not None:
         turned = attitude * Rotation.from_rotvec(rng.uniform(-near, near, 3))
         q_NB, w_NB_B = quaternion(turned), w_R + rng.uniform(-near, near, 3)
-    count, swing = len(units.phase), 0.0 if units.wheels else 1.0
-    angle, speed = units.phase + units.speed * t, units.speed
-    if reference.control.run_up is not None or units.wheels:
-        limit = reference.control.speed_limit
-        bound = FASTEST if limit is None else np.where(np.isfinite(limit), 1.3 * limit, FASTEST)
-        angle, speed = rng.uniform(-np.pi, np.pi, count), rng.uniform(-1.0, 1.0, count) * bound
+    bodies, count = len(reference.mechanism.names), len(units.phase)
+    swing = np.where(units.wheel, 0.0, 1.0)
+    turn, speed, _ = reference.control.prescribed(t)
+    limit = reference.control.speed_limit
+    bound = np.where(np.isfinite(limit), 1.3 * limit, FASTEST)
+    any_angle, any_speed = rng.uniform(-np.pi, np.pi, count), rng.uniform(-1.0, 1.0, count) * bound
+    driven = units.wheel & ~reference.control.runs_up
     motion = Motion(
-        p_NB_N=rng.uniform(-1.0, 1.0, 3),
-        q_NB=q_NB / np.linalg.norm(q_NB),
-        p_NP_N=np.zeros(3),
-        q_NP=np.zeros(4),
-        v_NB_N=rng.uniform(-1.0, 1.0, 3),
-        w_NB_B=w_NB_B,
-        v_NP_N=np.zeros(3),
-        w_NP_P=np.zeros(3),
+        p_NX_N=rng.uniform(-1.0, 1.0, 3) * np.ones((bodies, 1)),
+        q_NX=q_NB / np.linalg.norm(q_NB) * np.ones((bodies, 1)),
+        v_NX_N=rng.uniform(-1.0, 1.0, 3) * np.ones((bodies, 1)),
+        w_NX_X=w_NB_B * np.ones((bodies, 1)),
         gimbal_angle=swing * rng.uniform(-np.pi, np.pi, count),
         gimbal_rate=swing * size * rng.uniform(-1.0, 1.0, count),
-        rotor_angle=angle,
-        rotor_speed=speed,
+        rotor_angle=np.where(driven, any_angle, units.phase + turn),
+        rotor_speed=np.where(driven, any_speed, speed),
         error_integral=size * rng.uniform(-1.0, 1.0, 3),
     )
     return _displaced(reference, motion, rng, 1.0)
 
 
 def kicked(reference: ReferenceSatellite, motion: Motion, rng: np.random.Generator) -> Motion:
-    """The motion with bus, plate and gimbals pushed, so that every term of the equations acts.
+    """The motion with all bodies and gimbals pushed, so that every term of the equations acts.
 
     The bus turns by up to 0.05 rad/s per axis more, gimbals by 0.3 rad/s.
     """
-    units = reference.mechanism.units
-    swing = 0.0 if units.wheels else 0.3
+    units, count = reference.mechanism.units, len(motion.gimbal_rate)
+    velocity, rate = motion.v_NX_N.copy(), motion.w_NX_X.copy()
+    velocity[0] += rng.uniform(-0.01, 0.01, 3)
+    rate[0] += rng.uniform(-0.05, 0.05, 3)
     pushed = replace(
         motion,
-        v_NB_N=motion.v_NB_N + rng.uniform(-0.01, 0.01, 3),
-        w_NB_B=motion.w_NB_B + rng.uniform(-0.05, 0.05, 3),
-        gimbal_rate=swing * rng.uniform(-1.0, 1.0, len(units.phase)),
+        v_NX_N=velocity,
+        w_NX_X=rate,
+        gimbal_rate=np.where(units.wheel, 0.0, 0.3) * rng.uniform(-1.0, 1.0, count),
         error_integral=rng.uniform(-0.1, 0.1, 3),
     )
     return _displaced(reference, pushed, rng, 0.1)
@@ -88,13 +87,14 @@ def kicked(reference: ReferenceSatellite, motion: Motion, rng: np.random.Generat
 def _displaced(
     reference: ReferenceSatellite, motion: Motion, rng: np.random.Generator, size: float
 ) -> Motion:
-    """The plate displaced by up to 5 % of the shortest leg and 0.05 rad per axis, times size.
+    """Bodies beside the bus displaced by up to 5 % of the shortest leg and 0.05 rad, times size.
 
-    Its speeds in the bus are up to 1 m/s and 1 rad/s, times size.
+    Their speeds in the bus are up to 1 m/s and 1 rad/s per axis, times size.
     """
     mechanism = reference.mechanism
-    if mechanism.mount == "rigid":
-        return with_plate(mechanism, motion)
-    shift = 0.05 * size * float(np.min(np.linalg.norm(mechanism.spans_B, axis=1)))
-    off = [rng.uniform(-bound, bound, 3) for bound in (shift, 0.05 * size, size, size)]
-    return with_plate(mechanism, motion, *off)
+    riding = placed(mechanism, motion, beside_bus(mechanism))
+    free = beside_bus(mechanism) & ~mechanism.welded
+    shift = 0.05 * size * float(np.min(np.linalg.norm(mechanism.spans_Y, axis=1)))
+    shape = (np.count_nonzero(free), 3)
+    off = [rng.uniform(-bound, bound, shape) for bound in (shift, 0.05 * size, size, size)]
+    return placed(mechanism, riding, free, *off)

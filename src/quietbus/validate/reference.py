@@ -8,7 +8,7 @@ from quietbus.dynamics.equations import Accelerations, Wrench
 from quietbus.dynamics.state import State
 from quietbus.model.satellite import Satellite
 from quietbus.reference import multibody
-from quietbus.validate.translate import mechanism_of, motion_of
+from quietbus.validate.translate import BUS, PLATE, mechanism_of, motion_of
 
 
 class Reference:
@@ -31,7 +31,9 @@ class Reference:
         self._body.set(motion_of(self._satellite, state, rotor_angle))
         still = np.zeros(len(rotor_angle))
         spin_up = still if rotor_acceleration is None else np.asarray(rotor_acceleration)
-        loads = multibody.Wrench(*(np.array(vector) for vector in vars(wrench).values()))
-        found = self._body.accelerations(np.asarray(gimbal_acceleration), spin_up, loads)
-        each = (found.v_P, found.w_P, found.v_B, found.w_B)
+        on_P, on_B = (wrench.force_P, wrench.torque_P), (wrench.force_B, wrench.torque_B)
+        found = self._body.accelerations(
+            np.asarray(gimbal_acceleration), spin_up, np.array([on_B, on_P])
+        )
+        each = (found.v[PLATE], found.w[PLATE], found.v[BUS], found.w[BUS])
         return Accelerations(*(jnp.asarray(vector) for vector in each))

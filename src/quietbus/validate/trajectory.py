@@ -193,7 +193,7 @@ def fastest_rate(satellite: Satellite) -> float:
     unit = np.asarray(cluster.gimbal_mass + cluster.rotor_mass)
     inertia_P = np.asarray(satellite.plate.I_PPcm_P)  # with the units as points
     inertia_P = inertia_P + sum(map(point_inertia, unit, np.asarray(cluster.p_PC_P)))
-    spans = mechanism_of(satellite).spans_B
+    spans = mechanism_of(satellite).spans_Y
     s = spans / np.linalg.norm(spans, axis=1, keepdims=True)
     fastest = float(np.max(np.abs(cluster.rotor_speed)))
     if satellite.mount == "rigid":
