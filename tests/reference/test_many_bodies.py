@@ -257,8 +257,12 @@ def test_one_platform_in_a_list_and_a_cluster_in_two_blocks_are_what_they_were(m
 
 
 def test_the_order_of_platforms_does_not_matter():
-    """Units of the first have to keep their numbers: the second has none here."""
+    """Units keep their numbers, since only the first has any; their rotors have lines."""
     data = satellite()
+    line = {"order": 1.3, "radial_force": 2e-5, "axial_force": 1e-5, "phase": 0.4}
+    line |= {"radial_torque": 3e-6, "axial_torque": 1e-6, "whirl": "forward"}
+    for block in data["platforms"][0]["cluster"]:
+        block["rotor"]["disturbance"] = {"orders": [line], "resonances": {}, "seed": 0}
     data["platforms"][1]["cluster"] = []
     swapped = data | {"platforms": data["platforms"][::-1]}
     assert _apart(data, swapped, np.array([0, 2, 1, 3])) < 1e-9
