@@ -11,6 +11,7 @@ from quietbus.scenario.load import (
 from quietbus.scenario.per_cmg import per_cmg_scenarios
 from quietbus.scenario.pointing import LineOfSight
 from quietbus.scenario.schema import Scenario
+from quietbus.scenario.sites import Site
 from quietbus.scenario.wheel_files import WheelTable, read_wheel_table
 
 __all__ = [
@@ -18,6 +19,7 @@ __all__ = [
     "Problem",
     "Scenario",
     "ScenarioError",
+    "Site",
     "WheelTable",
     "builtin_names",
     "builtin_text",

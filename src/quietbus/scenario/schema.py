@@ -26,6 +26,7 @@ from quietbus.scenario.errors import Findings, Path, Problem, ScenarioError, dot
 from quietbus.scenario.hardware import Bus, Cluster, Isolator
 from quietbus.scenario.limits import MOST_SAMPLES, Oversize, plain
 from quietbus.scenario.pointing import LinesOfSight, Requirements, unknown_lines
+from quietbus.scenario.sites import Site
 from quietbus.scenario.text import read_yaml, write_yaml
 from quietbus.scenario.units import expected, whole_number
 from quietbus.scenario.wheels import AnyCluster, WheelCluster, cluster_type
@@ -119,6 +120,11 @@ class Scenario(Part):
 
     def __hash__(self) -> int:
         return hash(json.dumps(self.to_dict(), sort_keys=True))
+
+    @property
+    def sites(self) -> tuple[Site, ...]:
+        """What stands on the bus; one site named ``platform`` for ``isolator`` and ``cluster``."""
+        return (Site("platform", self.isolator, (self.cluster,)),)
 
     @model_validator(mode="after")
     def _check_requirements(self) -> Self:
