@@ -175,6 +175,7 @@ def compare(
         resume: go on from them, as of ``simulate``.
     """
     function("progress", progress)
+    scenario = _as_run(scenario, None, duration)
     mounts: tuple[Mount, ...] = ("isolated", "rigid")
     stop, troubles = threading.Event(), list[str]()
 
@@ -185,14 +186,14 @@ def compare(
             if stop.is_set():
                 raise KeyboardInterrupt
 
-        task = Task(_as_run(scenario, mount, duration), "direct")
+        task = Task(_as_run(scenario, mount, None), "direct")
         done, said = _kept(_direct, task, tell, (checkpoints or {}).get(mount), resume)
         troubles.extend(said)
         return done
 
-    _tell_implausible(_as_run(scenario, None, duration))
-    refuse_coarse_output(_as_run(scenario, None, duration))
-    warning = aliasing(_as_run(scenario, None, duration))
+    _tell_implausible(scenario)
+    refuse_coarse_output(scenario)
+    warning = aliasing(scenario)
     if warning:
         warnings.warn(warning, QuietbusWarning, stacklevel=2)
     with concurrent.futures.ThreadPoolExecutor(len(mounts)) as pool:
@@ -207,7 +208,7 @@ def compare(
     for trouble in troubles:
         warnings.warn(trouble, QuietbusWarning, stacklevel=2)
     for name, done in runs.items():
-        aliased = _aliased(_as_run(scenario, None, duration), done)
+        aliased = _aliased(scenario, done)
         for note in (*filter(None, [aliased]), *rotor_notes(done), *delivery_notes(done)):
             warnings.warn(f"{name}: {note}", QuietbusWarning, stacklevel=2)
     return runs
@@ -443,7 +444,8 @@ def _as_run(
         "simulation.duration": duration,
         "simulation.output_rate": output_rate,
     }
-    return scenario.with_overrides({k: v for k, v in wanted.items() if v is not None})
+    changes = {path: value for path, value in wanted.items() if value is not None}
+    return scenario.with_overrides(changes) if changes else scenario
 
 
 class _Keeping:

@@ -10,7 +10,7 @@ import xarray as xr
 
 from quietbus.analysis.jitter import combine
 from quietbus.dynamics.outputs import Outputs
-from quietbus.results.origin import rotors
+from quietbus.results.origin import rotors, text_of
 from quietbus.results.schema import (
     COMBINED,
     CONTROL_VARIABLES,
@@ -106,7 +106,7 @@ def to_dataset(
     scheme = Scheme() if jitter is None else SLOW
     attributes = {
         "title": f"{scenario.name}, {scenario.isolator.mount}",
-        "scenario": scenario.to_yaml(),
+        "scenario": text_of(scenario),
         "mount": scenario.isolator.mount,
         "method": "direct" if jitter is None else "harmonic",
         "status": status,

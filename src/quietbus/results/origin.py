@@ -1,5 +1,12 @@
-"""What a run was made from: its scenario, and what that says of the rotors."""
+"""What a run was made from: its scenario, and what that says of the rotors.
 
+A run carries its scenario as text, so that files and other programs can read it. Within a process
+the Scenario is found again by that text: a slice or a copy of a run has the same, and whoever
+writes another text into it has another scenario.
+"""
+
+import threading
+from collections import OrderedDict
 from typing import Any
 
 import numpy as np
@@ -8,6 +15,43 @@ import xarray as xr
 from quietbus.scenario import Scenario
 from quietbus.scenario.wheels import WheelCluster
 from quietbus.words import shown
+
+MOST_LETTERS = 8_000_000  # of the texts whose scenarios are kept, a thousand ordinary ones
+
+_kept: OrderedDict[str, Scenario] = OrderedDict()  # by text, the one used last at the end
+_lock = threading.Lock()
+
+
+def text_of(scenario: Scenario) -> str:
+    """The text by which a run carries its scenario."""
+    text = scenario.to_yaml()
+    _keep(text, scenario)
+    return text
+
+
+def scenario_from(text: str, source: str) -> Scenario:
+    """The scenario whose text a run carries; it is parsed the first time alone.
+
+    Raises:
+        ScenarioError: the text is no valid scenario; ``source`` is named.
+    """
+    known = _kept.get(text)
+    if known is None:
+        known = Scenario.from_yaml(text, source)
+        if "rotor_phases" not in known.cluster.model_fields_set:
+            # a run now says them always; one made before they were random by default had zeros
+            zeros = [0.0] * known.cluster.count
+            known = known.with_overrides({"cluster.rotor_phases": zeros})
+    _keep(text, known)
+    return known
+
+
+def _keep(text: str, scenario: Scenario) -> None:
+    with _lock:
+        _kept[text] = scenario
+        _kept.move_to_end(text)
+        while sum(map(len, _kept)) > MOST_LETTERS:
+            _kept.popitem(last=False)
 
 
 def refuse_no_run(run: Any) -> None:
@@ -26,11 +70,7 @@ def scenario_of(run: xr.Dataset) -> Scenario:
         ValueError: a Dataset that is not a run; ScenarioError, if its scenario is not valid.
     """
     refuse_no_run(run)
-    scenario = Scenario.from_yaml(run.attrs["scenario"], source="the run's scenario")
-    if "rotor_phases" in scenario.cluster.model_fields_set:
-        return scenario
-    # a run now says them always; one made before they were random by default had zeros
-    return scenario.with_overrides({"cluster.rotor_phases": [0.0] * scenario.cluster.count})
+    return scenario_from(run.attrs["scenario"], "the run's scenario")
 
 
 def has_gimbals(run: xr.Dataset) -> bool:

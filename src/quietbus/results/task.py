@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from quietbus.dynamics.vibration import View
+from quietbus.results.origin import scenario_from, text_of
 from quietbus.scenario import Scenario
 
 
@@ -31,7 +32,7 @@ class Task:
         """For JSON."""
         named = lambda arrays: {name: np.asarray(a).tolist() for name, a in arrays.items()}  # noqa: E731
         return {
-            "scenario": self.scenario.to_yaml(),
+            "scenario": text_of(self.scenario),
             "method": self.method,
             "joint_forces": self.joint_forces,
             "points": named(self.points),
@@ -43,7 +44,7 @@ class Task:
         """What ``to_dict`` gave."""
         named = lambda lists: {name: np.array(given) for name, given in lists.items()}  # noqa: E731
         return cls(
-            Scenario.from_yaml(data["scenario"], source="the checkpoint's scenario"),
+            scenario_from(data["scenario"], "the checkpoint's scenario"),
             data["method"],
             data["joint_forces"],
             named(data["points"]),
