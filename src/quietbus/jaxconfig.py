@@ -1,11 +1,18 @@
 """JAX settings of the whole package: double precision, compilation cache, small loops in one piece.
 
-Imported before JAX and Equinox by every package that computes. What the user has already chosen in
-the environment (``JAX_COMPILATION_CACHE_DIR``, ``XLA_FLAGS``, ``EQX_ON_ERROR``) is respected.
+Imported by every package that computes, before it uses JAX. What the user has already chosen
+(``JAX_COMPILATION_CACHE_DIR``, options in ``XLA_FLAGS``) is respected, and the environment stays as
+it is: docs/api.md says what changes in the process.
 """
 
 import os
 from importlib.metadata import version
+
+import jax
+from jaxlib.xla_client import CompileOptions
+from platformdirs import user_cache_path
+
+from quietbus.processes import DeviceError
 
 # XLA runs each small operation of a loop as a kernel of its own, with an overhead as large as the
 # operation. Loops that touch less than this many bytes are compiled as one function instead, which
@@ -17,19 +24,22 @@ _FLAGS = {
 # the process where it does not know a flag, so only for versions that do.
 if (0, 6) <= tuple(int(part) for part in version("jaxlib").split(".")[:2]) < (0, 11):
     _FLAGS["xla_cpu_use_fusion_emitters"] = "false"
-_given = os.environ.get("XLA_FLAGS", "")
-_added = [f"--{flag}={value}" for flag, value in _FLAGS.items() if flag not in _given]
-os.environ["XLA_FLAGS"] = " ".join([_given, *_added]).strip()
 
-# Diffrax checks its arguments through callbacks into Python, and JAX does not keep programs with
-# callbacks in its cache. A failed check shows as NaN instead, which every run looks for.
-os.environ.setdefault("EQX_ON_ERROR", "nan")
 
-import jax  # noqa: E402
-from platformdirs import user_cache_path  # noqa: E402
+def _let_xla_read_flags() -> None:
+    """XLA reads its flags once in a process; programs that the user starts have no part in them."""
+    given = os.environ.get("XLA_FLAGS")
+    added = [f"--{flag}={value}" for flag, value in _FLAGS.items() if flag not in (given or "")]
+    os.environ["XLA_FLAGS"] = " ".join([given or "", *added]).strip()
+    try:
+        _ = CompileOptions().executable_build_options.debug_options  # for which XLA reads them
+    finally:
+        del os.environ["XLA_FLAGS"]
+        if given is not None:
+            os.environ["XLA_FLAGS"] = given
 
-from quietbus.processes import DeviceError  # noqa: E402
 
+_let_xla_read_flags()
 jax.config.update("jax_enable_x64", True)
 
 if jax.config.values["jax_compilation_cache_dir"] is None:

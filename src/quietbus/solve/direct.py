@@ -23,6 +23,7 @@ from quietbus.dynamics.state import State
 from quietbus.model.cmg import ClusterMoments
 from quietbus.model.satellite import Satellite
 from quietbus.model.variants import without_disturbance
+from quietbus.solve.integrator import diffeqsolve
 from quietbus.solve.resolved_steps import ResolvingController, fastest_line
 from quietbus.spatial.rotation import quaternion_normalize
 
@@ -216,7 +217,7 @@ def _compiled_piece(satellite, state, numbers, scheme) -> _Piece:
         finish = jnp.where(jnp.any(jumps == t1), jnp.nextafter(t1, t0), t1)
         jumps = jnp.where(jumps == t1, jnp.inf, jumps)
         controller = diffrax.ClipStepSizeController(controller, jump_ts=jumps)
-    solution = diffrax.diffeqsolve(
+    solution = diffeqsolve(
         diffrax.ODETerm(rate),
         scheme.solver(),
         t0,

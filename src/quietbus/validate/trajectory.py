@@ -25,6 +25,7 @@ from quietbus.model.satellite import Satellite
 from quietbus.model.variants import without_friction, without_leg_mass, without_rotation
 from quietbus.reference.engine import import_mujoco
 from quietbus.reference.mjcf import ARMATURE
+from quietbus.solve.integrator import diffeqsolve
 from quietbus.spatial.inertia import point_inertia
 from quietbus.validate.mjcf import write_mjcf
 from quietbus.validate.translate import mechanism_of
@@ -78,7 +79,7 @@ def fly(
         return ravel_pytree(state_rate(satellite, t, unravel(y), None, moments))[0]
 
     steps = diffrax.PIDController(rtol=tolerance, atol=0.1 * tolerance)
-    flight = diffrax.diffeqsolve(
+    flight = diffeqsolve(
         diffrax.ODETerm(rate),
         diffrax.Dopri8(),
         times[0],
