@@ -16,10 +16,10 @@ from importlib.metadata import version
 import numpy as np
 
 import quietbus as qb
-from quietbus.analysis.coupled import analyze_coupled, controlled
-from quietbus.analysis.designs import map_designs
-from quietbus.analysis.loop import analyze_loop
-from quietbus.study import Study
+from quietbus.analysis.control.coupled import analyze_coupled, controlled
+from quietbus.analysis.control.designs import map_designs
+from quietbus.analysis.control.loop import analyze_loop
+from quietbus.studies.linear import Study
 
 REPEATS = 20
 

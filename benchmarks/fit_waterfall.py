@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.signal import welch
 
-from quietbus.analysis.waterfall import ComponentFit, FitError, Waterfall, fit
+from quietbus.analysis.signals.waterfall import ComponentFit, FitError, Waterfall, fit
 
 RATE, SEGMENT = 1024.0, 1024
 WINDOWS = ("hann", "hamming", "blackman", "flattop", "boxcar", "tukey 0.25")

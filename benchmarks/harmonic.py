@@ -26,7 +26,7 @@ import numpy as np  # noqa: E402
 
 import quietbus as qb  # noqa: E402
 from quietbus.build import build_initial_state, build_satellite  # noqa: E402
-from quietbus.jitter_study import jitter_of_designs  # noqa: E402
+from quietbus.studies.jitter import jitter_of_designs  # noqa: E402
 from quietbus.validate import write_mjcf  # noqa: E402
 from quietbus.validate.trajectory import massless_legs  # noqa: E402
 

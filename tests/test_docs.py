@@ -13,7 +13,7 @@ import typer
 import quietbus as qb
 from oracles.pages import assert_rounds, assert_shown, table
 from quietbus import cli
-from quietbus.analysis.windows import METRICS
+from quietbus.analysis.pointing.windows import METRICS
 from quietbus.results import CONTROL_VARIABLES, JOINT_VARIABLES, ROTOR_VARIABLES, VARIABLES, Summary
 from quietbus.scenario import builtin_names
 from quietbus.scenario.base import Count, Part

@@ -11,7 +11,7 @@ import quietbus as qb
 from oracles.spectra import map_of
 from oracles.wheels import measured as spectra
 from quietbus import cli
-from quietbus.analysis.waterfall import FitError, LineShape
+from quietbus.analysis.signals.waterfall import FitError, LineShape
 from quietbus.measured import MapError, WaterfallFit
 from quietbus.scenario.text import read_yaml
 

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import quietbus as qb
-from quietbus.analysis.residual import residual
+from quietbus.analysis.signals.residual import residual
 
 CONTRACT = {  # variable: (dimensions, unit), design/interface.md
     "bus_position": (("time", "axis"), "m"),

@@ -1,6 +1,6 @@
-from .analysis.isolator import SingleAxisIsolator as SingleAxisIsolator
-from .analysis.run_up import compare_run_up as compare_run_up
-from .analysis.waterfall import FitError as FitError
+from .analysis.control.isolator import SingleAxisIsolator as SingleAxisIsolator
+from .analysis.jitter.run_up import compare_run_up as compare_run_up
+from .analysis.signals.waterfall import FitError as FitError
 from .api import ImplausibleValue as ImplausibleValue
 from .api import QuietbusWarning as QuietbusWarning
 from .api import SimulationError as SimulationError
@@ -12,12 +12,10 @@ from .api import platforms as platforms
 from .api import simulate as simulate
 from .api import verify as verify
 from .api import worst_over_phases as worst_over_phases
-from .jitter_study import JitterStudy as JitterStudy
 from .measured import MapError as MapError
 from .measured import WaterfallFit as WaterfallFit
 from .measured import fit_waterfall as fit_waterfall
 from .measured import read_waterfall as read_waterfall
-from .platform_study import PlatformStudy as PlatformStudy
 from .results import load_run as load_run
 from .results import reconstruct as reconstruct
 from .results import save_run as save_run
@@ -30,6 +28,8 @@ from .scenario import load_scenario as load_scenario
 from .scenario import per_cmg_scenarios as per_cmg_scenarios
 from .scenario import read_wheel_table as read_wheel_table
 from .solve.harmonic import ResonanceError as ResonanceError
-from .verification import Verification as Verification
+from .studies.jitter import JitterStudy as JitterStudy
+from .studies.platforms import PlatformStudy as PlatformStudy
+from .studies.verification import Verification as Verification
 
 __version__: str

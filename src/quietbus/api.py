@@ -17,11 +17,7 @@ from quietbus.arguments import array, choice, flag, function, listing, mapping, 
 from quietbus.build import build_initial_state, build_satellite
 from quietbus.dynamics.linearize import Actuator, LinearModel, OperatingPoint
 from quietbus.dynamics.linearize import linearize as linearize_satellite
-from quietbus.jitter_study import JitterStudy
-from quietbus.jitter_study import worst_over_phases as worst_phases_at_rest
-from quietbus.platform_study import PlatformStudy
 from quietbus.processes import start_computing
-from quietbus.resolution import refuse_coarse_output, refuse_coarse_tolerance, unseen
 from quietbus.results import (
     aliasing,
     delivery_notes,
@@ -41,8 +37,12 @@ from quietbus.scenario.wheels import WheelCluster
 from quietbus.solve.direct import Reached, Scheme, Tolerances, integrate
 from quietbus.solve.harmonic import integrate_harmonic, on_periodic_solution
 from quietbus.solve.noise import with_noise
-from quietbus.study import Study
-from quietbus.verification import Verification, check_requirements
+from quietbus.studies.jitter import JitterStudy
+from quietbus.studies.jitter import worst_over_phases as worst_phases_at_rest
+from quietbus.studies.linear import Study
+from quietbus.studies.platforms import PlatformStudy
+from quietbus.studies.resolution import refuse_coarse_output, refuse_coarse_tolerance, unseen
+from quietbus.studies.verification import Verification, check_requirements
 
 Mount = Literal["isolated", "rigid"]
 METHODS = ("direct", "harmonic")

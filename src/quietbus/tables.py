@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
     import numpy as np
 
-    from quietbus.analysis.waterfall import FittedMode
+    from quietbus.analysis.signals.waterfall import FittedMode
     from quietbus.measured import WaterfallFit
     from quietbus.results import Summary
     from quietbus.scenario import Scenario
-    from quietbus.study import Study
+    from quietbus.studies.linear import Study
     from quietbus.validate import Check
 
 AXES = ("x", "y", "z")

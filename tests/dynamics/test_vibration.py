@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from oracles.satellites import awkward_satellite, paper_satellite
-from quietbus.analysis.jitter import steady_jitter
+from quietbus.analysis.jitter.lines import steady_jitter
 from quietbus.dynamics.closed_loop import initial_state
 from quietbus.dynamics.equations import force, mass_matrix, plate_motion
 from quietbus.dynamics.kinematics import PlateMotion

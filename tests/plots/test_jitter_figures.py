@@ -10,8 +10,7 @@ import xarray as xr
 
 import quietbus as qb
 from quietbus import plots
-from quietbus.analysis.jitter import KINDS
-from quietbus.jitter_study import jitter_of_designs
+from quietbus.analysis.jitter.lines import KINDS
 from quietbus.model.cmg import ORDERS
 from quietbus.plots import (
     compare_figures,
@@ -23,6 +22,7 @@ from quietbus.plots import (
 from quietbus.plots.signals import RotorLines, last_lines
 from quietbus.results import VARIABLES
 from quietbus.scenario import load_scenario
+from quietbus.studies.jitter import jitter_of_designs
 
 PASSED = np.array([0.01, 0.02, 0.05])  # what the synthetic platform leaves, per axis
 RNG = np.random.default_rng(7)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
 
-from quietbus.analysis.sweep import SpeedSweep, SpinningModes, critical_speeds
+from quietbus.analysis.jitter.sweep import SpeedSweep, SpinningModes, critical_speeds
 from quietbus.plots.sweep import NO_JITTER, _look_of_order, campbell, sweep_figures
 
 OWN = 2 * np.pi * 50.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from quietbus.analysis.waterfall import Waterfall
+from quietbus.analysis.signals.waterfall import Waterfall
 from quietbus.plots.waterfall import _name_rays
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from quietbus.analysis.spectrum import detrended
+from quietbus.analysis.signals.spectrum import detrended
 from quietbus.report.signals import jitter_over_time
 from quietbus.results import summarize
 from quietbus.scenario import load_scenario

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from quietbus import api
-from quietbus.analysis.isolator import SingleAxisIsolator
+from quietbus.analysis.control.isolator import SingleAxisIsolator
 from quietbus.reproduce.zhang2012 import filters, per_cmg
 
 SHARE = np.array([2.0, 2.0, 2.0, 0.25, 0.25, 0.75])  # hexapod stiffness over k, docs/analysis.md

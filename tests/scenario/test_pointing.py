@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from quietbus.analysis.windows import METRICS
+from quietbus.analysis.pointing.windows import METRICS
 from quietbus.scenario import LineOfSight, Scenario, ScenarioError, load_scenario
 from quietbus.scenario.pointing import _FORMS
 

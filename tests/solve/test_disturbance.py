@@ -10,10 +10,10 @@ from scipy.signal import welch
 import quietbus as qb
 from quietbus import cli
 from quietbus.build import build_initial_state, build_satellite
-from quietbus.resolution import refuse_coarse_output
 from quietbus.solve.direct import Tolerances, integrate
 from quietbus.solve.harmonic import integrate_harmonic, on_periodic_solution, refuse_resonance
 from quietbus.solve.noise import with_noise
+from quietbus.studies.resolution import refuse_coarse_output
 
 ORDERS = [
     {"order": 1, "radial_force": "2e-6 kg*m", "phase": "random"},

@@ -8,7 +8,7 @@ from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 
 import quietbus as qb
 from oracles.pages import assert_says
-from quietbus.verification import Verification
+from quietbus.studies.verification import Verification
 
 PAGE = (Path(__file__).parents[2] / "docs" / "jitter.md").read_text(encoding="utf-8")
 RPM = np.pi / 30.0

@@ -77,7 +77,7 @@ def fit(
     most: Annotated[int, typer.Option(min=1, help="Orders looked for in each component.")] = 20,
 ) -> None:
     """Fit orders, resonances and broadband floor to a measured speed-frequency map of a rotor."""
-    from quietbus.analysis.waterfall import FitError
+    from quietbus.analysis.signals.waterfall import FitError
     from quietbus.measured import fit_waterfall
 
     if not as_json and os.path.lexists(output):

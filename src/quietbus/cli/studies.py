@@ -36,8 +36,8 @@ from quietbus.cli.written import write_study
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from quietbus.jitter_study import JitterStudy
-    from quietbus.study import Study
+    from quietbus.studies.jitter import JitterStudy
+    from quietbus.studies.linear import Study
 
 
 @app.command()
@@ -143,7 +143,7 @@ def verify(
         make_folder(output, "verification.json")
     import_heavy()
     from quietbus import api
-    from quietbus.analysis.chi_square import UnsoundStatisticError
+    from quietbus.analysis.pointing.chi_square import UnsoundStatisticError
     from quietbus.solve.harmonic import ResonanceError
 
     try:

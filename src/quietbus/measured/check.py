@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from pydantic_core import PydanticCustomError
 
-from quietbus.analysis.waterfall import LineShape, segment_size, window_name
+from quietbus.analysis.signals.waterfall import LineShape, segment_size, window_name
 from quietbus.measured.units import PSD, Scale, scale_of
 from quietbus.scenario import Problem, ScenarioError
 from quietbus.scenario.units import Quantity, shown

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from quietbus.analysis.waterfall import (
+from quietbus.analysis.signals.waterfall import (
     ComponentFit,
     FitError,
     FittedMode,

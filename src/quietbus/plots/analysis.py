@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.patches import Circle
 
-from quietbus.analysis.isolator import CROSSING, transmissibility, transmissibility_peak
-from quietbus.analysis.loop_response import frequency_response, root_locus
+from quietbus.analysis.control.isolator import CROSSING, transmissibility, transmissibility_peak
+from quietbus.analysis.control.loop_response import frequency_response, root_locus
 from quietbus.plots.shapes import mode_shapes
 from quietbus.plots.style import COLOURS, DASHES, MARKERS, explain, new_figure, share_legend, style
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from quietbus.study import Study
+    from quietbus.studies.linear import Study
 
 AXES = ("x", "y", "z")
 LINES: list[dict[str, Any]] = [{"color": COLOURS[i], "linestyle": DASHES[i]} for i in range(3)]

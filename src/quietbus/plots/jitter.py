@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from quietbus.jitter_study import jitter_of_designs, worst_case_norm
 from quietbus.model.cmg import ORDERS
 from quietbus.plots.signals import AXES, LINES, NOISE, RotorLines
 from quietbus.plots.style import COLOURS, explain, new_figure, scaled, share_legend, style
+from quietbus.studies.jitter import jitter_of_designs, worst_case_norm
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from quietbus.jitter_study import JitterStudy
+    from quietbus.studies.jitter import JitterStudy
 
 NO_JITTER = f"no jitter: the rotors shake the bus by less than {NOISE:g} deg/s"
 ROUNDING = 1e-9  # of the largest line: lines that are left out

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.ticker import FuncFormatter
 
-from quietbus.analysis.power import Density, LinePower, cumulative
-from quietbus.analysis.spectrum import detrended
+from quietbus.analysis.pointing.power import Density, LinePower, cumulative
+from quietbus.analysis.signals.spectrum import detrended
 from quietbus.plots.jitter import log_scale
 from quietbus.plots.style import COLOURS, DASHES, explain, literal, new_figure, share_legend, style
-from quietbus.verification import ARCSEC
+from quietbus.studies.verification import ARCSEC
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from quietbus.analysis.motion import ImageMotion
-    from quietbus.analysis.power import Power
-    from quietbus.verification import Verdict, Verification
+    from quietbus.analysis.pointing.motion import ImageMotion
+    from quietbus.analysis.pointing.power import Power
+    from quietbus.studies.verification import Verdict, Verification
 
 MOST_NAMED = 8  # contributors in a picture; the others are one
 LEAST_SHARE = 1e-3  # of the RMS of all lines, that a line has to have to be named

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from quietbus.analysis.modes import Mode
-    from quietbus.study import Study
+    from quietbus.analysis.control.modes import Mode
+    from quietbus.studies.linear import Study
 
 AMPLITUDE = 0.12  # [-] largest displacement shown, of the platform's width
 PHASES = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)

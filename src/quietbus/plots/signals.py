@@ -9,9 +9,9 @@ import xarray as xr
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
-from quietbus.analysis.jitter import SAME_FREQUENCY, combine
-from quietbus.analysis.residual import residual
-from quietbus.analysis.spectrum import Spectrum, amplitude_spectrum, detrended
+from quietbus.analysis.jitter.lines import SAME_FREQUENCY, combine
+from quietbus.analysis.signals.residual import residual
+from quietbus.analysis.signals.spectrum import Spectrum, amplitude_spectrum, detrended
 from quietbus.plots.style import COLOURS, DASHES
 from quietbus.results import aliasing, scenario_of
 

@@ -9,7 +9,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from quietbus.analysis.run_up import TURNS
+from quietbus.analysis.jitter.run_up import TURNS
 from quietbus.plots.signals import AXES, LINES, NOISE
 from quietbus.plots.style import COLOURS, DASHES, explain, new_figure, scaled, share_legend, style
 
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from quietbus.analysis.run_up import RunUp
-    from quietbus.analysis.sweep import SpeedSweep
+    from quietbus.analysis.jitter.run_up import RunUp
+    from quietbus.analysis.jitter.sweep import SpeedSweep
 
 RPM = 30.0 / np.pi
 HERTZ = 0.5 / np.pi

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from quietbus.analysis.waterfall import ComponentFit, Waterfall
+    from quietbus.analysis.signals.waterfall import ComponentFit, Waterfall
     from quietbus.measured import WaterfallFit
 
 RPM = 30.0 / np.pi

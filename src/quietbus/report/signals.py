@@ -5,7 +5,7 @@ import xarray as xr
 from scipy.ndimage import maximum_filter1d
 from scipy.signal import oaconvolve, resample_poly
 
-from quietbus.analysis.residual import FINER
+from quietbus.analysis.signals.residual import FINER
 from quietbus.plots.signals import TREND, degrees, rotor_frequencies
 from quietbus.results import aliasing, scenario_of
 

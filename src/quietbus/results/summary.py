@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from quietbus.analysis.residual import residual, shows
+from quietbus.analysis.signals.residual import residual, shows
 from quietbus.results.origin import rotors, scenario_of
 from quietbus.results.schema import WORST_PHASES
 from quietbus.scenario import Scenario

@@ -7,7 +7,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from quietbus.analysis.jitter import AT_REST, rest_error, steady_jitter
+from quietbus.analysis.jitter.lines import AT_REST, rest_error, steady_jitter
 from quietbus.dynamics.state import State
 from quietbus.dynamics.vibration import Vibration
 from quietbus.model.disturbance import orders_of

@@ -11,10 +11,10 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import resample_poly
 
 from quietbus import api
-from quietbus.analysis.residual import FINER, residual
+from quietbus.analysis.signals.residual import FINER, residual
 from quietbus.results import save_run
 from quietbus.scenario import Scenario, load_scenario
-from quietbus.study import Study
+from quietbus.studies.linear import Study
 
 if TYPE_CHECKING:
     from quietbus.reproduce.paper import Workshop

@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from scipy.optimize import brentq
 
-from quietbus.analysis.isolator import transmissibility, transmissibility_peak
-from quietbus.analysis.loop import PID, Loop, LoopAnalysis, analyze_loop, attitude_loop
-from quietbus.analysis.loop_response import frequency_response, root_locus
+from quietbus.analysis.control.isolator import transmissibility, transmissibility_peak
+from quietbus.analysis.control.loop import PID, Loop, LoopAnalysis, analyze_loop, attitude_loop
+from quietbus.analysis.control.loop_response import frequency_response, root_locus
 from quietbus.dynamics.linearize import platform_inertia
 from quietbus.plots.style import COLOURS, DASHES, new_figure, share_legend
 from quietbus.reproduce.parts import Findings

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.axes import Axes
 
-from quietbus.analysis.filters import (
+from quietbus.analysis.jitter.filters import (
     FilteredJitter,
     HeldPlatform,
     filtered_jitter_of_designs,
@@ -19,7 +19,7 @@ from quietbus.plots.style import COLOURS, DASHES, new_figure, share_legend
 from quietbus.reproduce.parts import Findings
 from quietbus.reproduce.zhang2012.bench import Bench
 from quietbus.scenario import Scenario
-from quietbus.study import at_height
+from quietbus.studies.linear import at_height
 
 GOOD = 0.1  # [-] what counts as good enough
 SPEEDS = 2.0 * np.pi * np.geomspace(0.5, 200.0, 64)  # [rad/s] of the rotors

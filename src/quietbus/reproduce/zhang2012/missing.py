@@ -7,9 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
-from quietbus.analysis.channels import Channel
-from quietbus.analysis.coupled import analyze_coupled, controlled
-from quietbus.analysis.rational import peak
+from quietbus.analysis.control.channels import Channel
+from quietbus.analysis.control.coupled import analyze_coupled, controlled
+from quietbus.analysis.control.rational import peak
 from quietbus.dynamics.kinematics import PlateMotion, leg_motion
 from quietbus.dynamics.linearize import linearize
 from quietbus.model.satellite import Satellite
@@ -18,7 +18,7 @@ from quietbus.plots.style import COLOURS, DASHES, MARKERS, draw_line, new_figure
 from quietbus.reproduce.parts import Findings
 from quietbus.reproduce.zhang2012.bench import Bench
 from quietbus.reproduce.zhang2012.control import printed_channel
-from quietbus.study import Study
+from quietbus.studies.linear import Study
 
 HEIGHTS = np.union1d(np.linspace(-1.2, 2.0, 33), np.linspace(-0.1, 0.2, 61))  # [m] over the bus
 

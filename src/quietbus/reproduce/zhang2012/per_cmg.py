@@ -6,16 +6,16 @@ from typing import Any
 import numpy as np
 
 from quietbus import api
-from quietbus.analysis.coupled import stable_gain_range
-from quietbus.analysis.filters import platform_at_rest
-from quietbus.analysis.platforms import Platforms
+from quietbus.analysis.control.coupled import stable_gain_range
+from quietbus.analysis.jitter.filters import platform_at_rest
+from quietbus.analysis.jitter.platforms import Platforms
 from quietbus.model.satellite import Satellite
 from quietbus.model.variants import without_rotation
-from quietbus.platform_study import PlatformStudy
 from quietbus.plots.style import COLOURS, DASHES, MARKERS, new_figure, share_legend
 from quietbus.reproduce.parts import Findings
 from quietbus.reproduce.zhang2012.bench import Bench
 from quietbus.scenario import Scenario, per_cmg_scenarios
+from quietbus.studies.platforms import PlatformStudy
 
 SCALES = np.geomspace(0.25, 1.0, 7)  # of the small platforms against the one
 SWEEP_HZ = np.geomspace(0.5, 200.0, 36)  # rotor speeds

@@ -1,0 +1,1 @@
+"""Pointing metrics of image motion: exposure windows, noise, statistics, image quality."""

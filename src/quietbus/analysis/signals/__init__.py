@@ -1,0 +1,1 @@
+"""Signals as sampled: spectra, residuals, measured waterfalls of spectra."""

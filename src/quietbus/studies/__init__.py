@@ -1,0 +1,1 @@
+"""What a scenario is asked: a study each for linear analysis, jitter, platforms, pointing."""

@@ -1,0 +1,109 @@
+"""Transmissibility against the hexapod on a fixed base, momentum, and the limit of slow motion."""
+
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+
+import quietbus as qb
+from oracles.satellites import paper_satellite
+from quietbus.analysis.control.channels import hexapod_isolator
+from quietbus.analysis.control.transmissibility import Places, transmissibility
+from quietbus.dynamics.linearize import OperatingPoint, clamped, linearize, platform_inertia
+from quietbus.spatial.rotation import quaternion_to_matrix
+from quietbus.validate.trajectory import massless_legs
+
+REST = OperatingPoint(np.zeros(3), np.zeros(4))
+HZ = np.array([0.2, 2.5, 4.4, 30.0, 100.0])
+BASE = np.array([0.0, 0.0, 0.6])
+
+
+def passed(satellite, frequency=HZ):
+    places = Places(
+        mass=float(satellite.bus.mass),
+        inertia=np.asarray(satellite.bus.I_BBcm_B),
+        base=BASE,
+        R_BP=np.asarray(quaternion_to_matrix(satellite.q_BP)),
+        center=platform_inertia(satellite, np.zeros(4))[1],
+    )
+    rigid = linearize(replace(satellite, mount="rigid"), REST, "ideal")
+    return transmissibility(linearize(satellite, REST, "ideal"), rigid, places, frequency)
+
+
+def still(satellite):
+    cluster = replace(satellite.cluster, rotor_speed=0.0 * satellite.cluster.rotor_speed)
+    return replace(satellite, cluster=cluster)
+
+
+def uneven():
+    """Massless legs of unlike stiffness and damping under a plate that is not balanced."""
+    satellite = still(massless_legs(paper_satellite(imbalance=0.0)))
+    legs = replace(
+        satellite.legs,
+        stiffness=satellite.legs.stiffness * jnp.linspace(0.7, 1.4, 6),
+        damping=satellite.legs.damping * jnp.linspace(1.5, 0.6, 6),
+    )
+    plate = replace(satellite.plate, p_PPcm_P=jnp.array([0.1, -0.2, 0.15]))
+    return replace(satellite, legs=legs, plate=plate)
+
+
+def test_fixed_base_is_the_hexapod_isolator():
+    satellite = uneven()
+    mass, center, inertia = platform_inertia(satellite, np.zeros(4))
+    isolator = hexapod_isolator(
+        np.asarray(satellite.legs.p_PU_P),
+        np.asarray(satellite.legs.p_BA_B) - BASE,
+        0.25 * np.sqrt(2.0),
+        mass,
+        inertia,
+        center,
+        np.asarray(satellite.legs.stiffness),
+        np.asarray(satellite.legs.damping),
+    )
+    expected = isolator.transmissibility(2 * np.pi * HZ)
+    size = np.abs(expected).max(axis=(1, 2), keepdims=True)
+    np.testing.assert_allclose(passed(clamped(satellite)).base / size, expected / size, atol=1e-8)
+
+
+def test_what_the_base_does_not_get_the_plate_keeps():
+    """Momentum of the plate and its CMGs, from the motion of the plate alone."""
+    satellite = uneven()
+    mass, center, inertia = platform_inertia(satellite, np.zeros(4))
+    model = linearize(satellite, REST, "ideal")
+    s = 2j * np.pi * HZ[:, None, None]
+    outputs = ["plate_velocity", "bus_velocity", "plate_rate"]
+    motion = model.select(["plate_force", "plate_torque"], outputs).response(HZ)
+    cross = np.cross(np.eye(3), center)  # c x v = cross v
+    drive = np.block([[np.eye(3), np.zeros((3, 3))], [cross, np.eye(3)]])
+    motion = motion @ drive
+    v_P, w = motion[:, :3] + motion[:, 3:6], motion[:, 6:]
+    v = v_P - cross @ w  # of the mass centre: w x c
+    result = passed(satellite).base
+    kept = s * mass * v
+    np.testing.assert_allclose(result[:, :3], np.eye(6)[:3] - kept, atol=1e-9)
+    arm = np.array([0.0, 0.0, 0.25 * np.sqrt(2.0)]) + center  # from the base's centre
+    at_center = np.eye(6)[3:] - s * inertia @ w
+    moment = at_center + np.cross(np.eye(3), arm) @ result[:, :3]
+    np.testing.assert_allclose(result[:, 3:], moment, atol=1e-9)
+
+
+def test_slow_wrenches_pass_and_fast_ones_do_not():
+    study = qb.analyze("zhang2012")
+    slow, fast = study.transmissibility(np.array([1e-3, 100.0])).rate_ratio
+    np.testing.assert_allclose(slow, 1.0, atol=1e-3)
+    assert np.all(fast < 0.05)
+
+
+def test_line_of_sight_is_the_integral_of_the_rate():
+    study = qb.analyze("zhang2012")
+    result = study.transmissibility(HZ)
+    wrench = ["plate_force", "plate_torque"]
+    attitude = study.linear("ideal").select(wrench, ["bus_attitude"]).response(HZ)
+    np.testing.assert_allclose(result.line_of_sight, attitude, rtol=1e-8, atol=1e-15)
+
+
+def test_bus_rate_on_the_rigid_mount_is_that_of_one_body():
+    study = qb.analyze("zhang2012")
+    result = study.transmissibility(HZ)
+    rates = result.rigid_bus_rate * HZ[:, None, None]
+    np.testing.assert_allclose(rates, np.broadcast_to(rates[0], rates.shape), rtol=1e-9, atol=1e-15)
