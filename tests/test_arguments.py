@@ -75,6 +75,8 @@ WRONG = [  # call, what the message names
     (lambda: qb.platforms([]), "scenarios: expected one or more"),
     (lambda: qb.platforms([ZHANG], 5), "gimbal_angles: expected a list"),
     (lambda: qb.verify(ZHANG, method=None), "method: .* got nothing"),
+    (lambda: qb.Direct("1"), "relative_tolerance: expected a number above 0, got '1'"),
+    (lambda: qb.Harmonic(absolute_tolerance=1), "absolute_tolerance: expected a number from"),
     (lambda: qb.per_cmg_scenarios("zhang2012"), "scenario: expected a Scenario"),
     (lambda: qb.per_cmg_scenarios(ZHANG, -1.0), "scale: expected a finite number above 0"),
     (lambda: qb.per_cmg_scenarios(ZHANG, "x"), "scale: expected a number above 0"),

@@ -2,75 +2,42 @@
 
 import concurrent.futures
 import os
-import pathlib
 import threading
-import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from quietbus.arguments import array, choice, flag, function, listing, mapping, positive, vector
-from quietbus.build import build_initial_state, build_satellite
+from quietbus.arguments import choice, flag, function, listing, mapping, vector
+from quietbus.asked import (
+    Mount,
+    QuietbusWarning,
+    angles_asked,
+    scenario_asked,
+    task_asked,
+    tell_implausible,
+)
+from quietbus.build import build_satellite
 from quietbus.dynamics.linearize import Actuator, LinearModel, OperatingPoint
 from quietbus.dynamics.linearize import linearize as linearize_satellite
-from quietbus.processes import start_computing
-from quietbus.results import (
-    aliasing,
-    delivery_notes,
-    rotor_notes,
-    scenario_of,
-    summarize,
-    to_dataset,
-)
-from quietbus.results.checkpoint import Checkpoint
-from quietbus.results.dataset import slow_tolerances
-from quietbus.results.size import check_space
-from quietbus.results.task import Task
-from quietbus.scenario import LineOfSight, Problem, Scenario, ScenarioError, load_scenario
-from quietbus.scenario.plausibility import implausible
+from quietbus.methods import Direct, Method, as_method
+from quietbus.results import method_of, scenario_of, summarize
+from quietbus.runs import SimulationError, foreseen, remarks, solve, unshown
+from quietbus.scenario import Problem, Scenario, ScenarioError
 from quietbus.scenario.pointing import NO_REQUIREMENTS
-from quietbus.scenario.wheels import WheelCluster
-from quietbus.solve.direct import Reached, Scheme, Tolerances, integrate
-from quietbus.solve.harmonic import integrate_harmonic, on_periodic_solution
-from quietbus.solve.noise import with_noise
 from quietbus.studies.jitter import JitterStudy
 from quietbus.studies.jitter import worst_over_phases as worst_phases_at_rest
 from quietbus.studies.linear import Study
 from quietbus.studies.platforms import PlatformStudy
-from quietbus.studies.resolution import refuse_coarse_output, refuse_coarse_tolerance, unseen
 from quietbus.studies.verification import Verification, check_requirements
-
-Mount = Literal["isolated", "rigid"]
-METHODS = ("direct", "harmonic")
-HARMONIC_RATE = 10.0  # [Hz] of the outputs of a harmonic run, unless asked for otherwise
-
-
-Notes = tuple[str, ...]
-
-
-class QuietbusWarning(UserWarning):
-    """Something in a run that the user should know before trusting its numbers."""
-
-
-class ImplausibleValue(QuietbusWarning):
-    """A value of a scenario that no satellite has; most often its unit was left out."""
-
-
-class SimulationError(RuntimeError):
-    """A run that could not be finished; ``run`` holds what was computed until then."""
-
-    def __init__(self, message: str, run: xr.Dataset):
-        super().__init__(message)
-        self.run = run
 
 
 def simulate(
     scenario: Scenario | str,
-    method: str = "direct",
+    method: str | Method = "direct",
     mount: Mount | None = None,
     *,
     duration: float | None = None,
@@ -86,8 +53,9 @@ def simulate(
 
     Args:
         scenario: a scenario, the path of a scenario file, or a built-in's name.
-        method: "direct": the nonlinear equations, every rotor turn resolved. "harmonic": the slow
-            motion, and at every output instant the steady response to every order of every rotor.
+        method: "direct" or a ``Direct(...)``: the nonlinear equations, every rotor turn resolved.
+            "harmonic" or a ``Harmonic(...)``: the slow motion, and at every output instant the
+            steady response to every order of every rotor.
         mount: "isolated" or "rigid", instead of the scenario's own.
         duration: [s], instead of the scenario's own.
         output_rate: [Hz], instead of the scenario's own (direct) or 10 Hz (harmonic).
@@ -120,37 +88,21 @@ def simulate(
             ripple; what was computed until then is in its ``run``.
         KeyboardInterrupt: Ctrl-C before anything was computed.
     """
-    choice("method", method, METHODS)
+    method = as_method(method)
     flag("joint_forces", joint_forces)
     flag("resume", resume)
     function("progress", progress)
     points = mapping("points", points, "points of the bus")
     lines_of_sight = mapping("lines_of_sight", lines_of_sight, "directions or sensitivities")
-    if method == "harmonic":
-        if joint_forces:
-            raise ValueError("joint_forces needs method 'direct'")
-        rate = HARMONIC_RATE if output_rate is None else output_rate
-        scenario = _as_run(scenario, mount, duration, rate)
-        _tell_implausible(scenario)
-        task = _harmonic_task(scenario, points, lines_of_sight)
-        run, notes = _kept(_harmonic, task, progress, checkpoint, resume)
-    else:
-        if points or lines_of_sight:
-            raise ValueError("points and lines_of_sight need method 'harmonic'")
-        scenario = _as_run(scenario, mount, duration, output_rate)
-        _tell_implausible(scenario)
-        refuse_coarse_output(scenario)
-        task = Task(scenario, "direct", joint_forces)
-        run, notes = _kept(_direct, task, progress, checkpoint, resume)
-        notes += tuple(filter(None, [aliasing(scenario)]))
-    for note in (*notes, *rotor_notes(run), *delivery_notes(run)):
+    scenario = scenario_asked(scenario, mount, duration, method.output_rate(output_rate))
+    tell_implausible(scenario)
+    task = task_asked(scenario, method, joint_forces, points, lines_of_sight)
+    run, notes = solve(task, progress, checkpoint, resume)
+    for note in (*notes, *foreseen(task), *remarks(run)):
         warnings.warn(note, QuietbusWarning, stacklevel=2)
-    if run.attrs["status"] == "stopped":
-        raise SimulationError(run.attrs["stop_reason"], run)
-    if method == "direct":
-        aliased = _aliased(scenario, run)
-        if aliased:
-            raise SimulationError(aliased, run)
+    failed = run.attrs["stop_reason"] if run.attrs["status"] == "stopped" else unshown(task, run)
+    if failed:
+        raise SimulationError(failed, run)
     if run.attrs["status"] == "interrupted":
         warnings.warn(run.attrs["stop_reason"], QuietbusWarning, stacklevel=2)
     return run
@@ -175,43 +127,37 @@ def compare(
         resume: go on from them, as of ``simulate``.
     """
     function("progress", progress)
-    scenario = _as_run(scenario, None, duration)
+    scenario = scenario_asked(scenario, duration=duration)
+    tell_implausible(scenario)
     mounts: tuple[Mount, ...] = ("isolated", "rigid")
-    stop, troubles = threading.Event(), list[str]()
+    tasks = {mount: task_asked(scenario_asked(scenario, mount), Direct()) for mount in mounts}
+    files, tell = checkpoints or {}, progress or (lambda mount, t: None)  # noqa: ARG005
+    stop = threading.Event()
 
-    def run(mount: Mount) -> xr.Dataset:
-        def tell(t: float) -> None:
-            if progress is not None:
-                progress(mount, t)
+    def run(mount: Mount) -> tuple[xr.Dataset, tuple[str, ...]]:
+        def reached(t: float) -> None:
+            tell(mount, t)
             if stop.is_set():
                 raise KeyboardInterrupt
 
-        task = Task(_as_run(scenario, mount, None), "direct")
-        done, said = _kept(_direct, task, tell, (checkpoints or {}).get(mount), resume)
-        troubles.extend(said)
-        return done
+        return solve(tasks[mount], reached, files.get(mount), resume)
 
-    _tell_implausible(scenario)
-    refuse_coarse_output(scenario)
-    warning = aliasing(scenario)
-    if warning:
-        warnings.warn(warning, QuietbusWarning, stacklevel=2)
+    for note in foreseen(tasks["isolated"]):
+        warnings.warn(note, QuietbusWarning, stacklevel=2)
     with concurrent.futures.ThreadPoolExecutor(len(mounts)) as pool:
         futures = {mount: pool.submit(run, mount) for mount in mounts}
         try:
             concurrent.futures.wait(futures.values())
         except KeyboardInterrupt:
             stop.set()
-        runs: dict[str, xr.Dataset] = {}
-        for mount, future in futures.items():
-            runs[mount] = future.result()
-    for trouble in troubles:
-        warnings.warn(trouble, QuietbusWarning, stacklevel=2)
-    for name, done in runs.items():
-        aliased = _aliased(scenario, done)
-        for note in (*filter(None, [aliased]), *rotor_notes(done), *delivery_notes(done)):
-            warnings.warn(f"{name}: {note}", QuietbusWarning, stacklevel=2)
-    return runs
+        solved = {mount: future.result() for mount, future in futures.items()}
+    for _, notes in solved.values():
+        for note in notes:
+            warnings.warn(note, QuietbusWarning, stacklevel=2)
+    for mount, (done, _) in solved.items():
+        for note in (*filter(None, [unshown(tasks[mount], done)]), *remarks(done)):
+            warnings.warn(f"{mount}: {note}", QuietbusWarning, stacklevel=2)
+    return {mount: done for mount, (done, _) in solved.items()}
 
 
 def worst_over_phases(run: xr.Dataset) -> np.ndarray | None:
@@ -222,7 +168,7 @@ def worst_over_phases(run: xr.Dataset) -> np.ndarray | None:
     speeds of the end. None where there is no such steady motion.
     """
     scenario = scenario_of(run)
-    if run.attrs["method"] == "harmonic":
+    if method_of(run).jitter_apart:
         return summarize(run).worst_phases_rate
     last = run.isel(time=-1)
     speed = last["rotor_speed"].to_numpy() if "rotor_speed" in run else None
@@ -245,9 +191,9 @@ def analyze(scenario: Scenario | str, gimbal_angle: ArrayLike | None = None) -> 
         ScenarioError: the scenario is not valid.
         ValueError: a wrong number of gimbal angles, or ones for which there is no analysis.
     """
-    scenario = _as_run(scenario, None, None)
-    _tell_implausible(scenario)
-    return Study(scenario, _gimbal_angles(scenario, gimbal_angle))
+    scenario = scenario_asked(scenario)
+    tell_implausible(scenario)
+    return Study(scenario, angles_asked(scenario, gimbal_angle))
 
 
 def jitter(scenario: Scenario | str, gimbal_angle: ArrayLike | None = None) -> JitterStudy:
@@ -266,9 +212,9 @@ def jitter(scenario: Scenario | str, gimbal_angle: ArrayLike | None = None) -> J
         ValueError: a wrong number of gimbal angles, or a satellite that cannot rest.
         ResonanceError: an order of a rotor lies on an undamped mode.
     """
-    scenario = _as_run(scenario, None, None)
-    _tell_implausible(scenario)
-    return JitterStudy(scenario, _gimbal_angles(scenario, gimbal_angle))
+    scenario = scenario_asked(scenario)
+    tell_implausible(scenario)
+    return JitterStudy(scenario, angles_asked(scenario, gimbal_angle))
 
 
 def platforms(
@@ -292,9 +238,9 @@ def platforms(
         ResonanceError: an order of a rotor lies on an undamped mode.
     """
     several = listing("scenarios", scenarios, "scenarios, one for each platform")
-    loaded = tuple(_as_run(scenario, None, None) for scenario in several)
+    loaded = tuple(scenario_asked(scenario) for scenario in several)
     for each in loaded:
-        _tell_implausible(each)
+        tell_implausible(each)
     if not loaded:
         raise ValueError("scenarios: expected one or more, one for each platform, got none")
     given: list[Any] = [None] * len(loaded)
@@ -304,13 +250,13 @@ def platforms(
         raise ValueError(
             f"gimbal_angles: expected {len(loaded)} lists, one for each scenario, got {len(given)}"
         )
-    angles = (_gimbal_angles(s, own) for s, own in zip(loaded, given, strict=True))
+    angles = (angles_asked(s, own) for s, own in zip(loaded, given, strict=True))
     return PlatformStudy(loaded, tuple(angles))
 
 
 def verify(
     scenario: Scenario | str,
-    method: str = "harmonic",
+    method: str | Method = "harmonic",
     mount: Mount | None = None,
     *,
     duration: float | None = None,
@@ -321,8 +267,9 @@ def verify(
 
     Args:
         scenario: a scenario, the path of a scenario file, or a built-in's name.
-        method: "harmonic": slow motion and lines, over all rotor phases. "direct": one run with
-            every rotor turn resolved, the only member of its ensemble.
+        method: "harmonic" or a ``Harmonic(...)``: slow motion and lines, over all rotor phases.
+            "direct" or a ``Direct(...)``: one run with every rotor turn resolved, the only member
+            of its ensemble.
         mount: "isolated" or "rigid", instead of the scenario's own.
         duration: [s], instead of the scenario's own.
         output_rate: [Hz], as of ``simulate``.
@@ -337,9 +284,9 @@ def verify(
         SimulationError: the run is not complete.
         ValueError, ResonanceError: as of ``simulate``.
     """
-    choice("method", method, METHODS)
+    method = as_method(method)
     function("progress", progress)
-    scenario = _as_run(scenario, mount, duration, None if method == "harmonic" else output_rate)
+    scenario = scenario_asked(scenario, mount, duration, method.output_rate(output_rate))
     if not scenario.requirements:
         raise ScenarioError(scenario.name, [Problem(NO_REQUIREMENTS, ("requirements",))])
     check_requirements(scenario, method, scenario.simulation.duration)
@@ -374,181 +321,16 @@ def linearize(
         ScenarioError: the scenario is not valid.
         ValueError: a value of the wrong kind or shape, or a point that is not an equilibrium.
     """
-    scenario = _as_run(scenario, mount, None)
+    scenario = scenario_asked(scenario, mount)
     choice("actuator", actuator, ("servo", "ideal"))
     points = mapping("points", points, "points of the bus")
-    _tell_implausible(scenario)
+    tell_implausible(scenario)
     return linearize_satellite(
         build_satellite(scenario),
         OperatingPoint(
             vector("rate", np.zeros(3) if rate is None else rate, 3),
-            _gimbal_angles(scenario, gimbal_angles),
+            angles_asked(scenario, gimbal_angles),
         ),
         actuator,
         {name: vector(f"points[{name!r}]", p, 3) for name, p in points.items()},
     )
-
-
-def _tell_implausible(scenario: Scenario) -> None:
-    for note in implausible(scenario):
-        warnings.warn(note, ImplausibleValue, stacklevel=3)
-
-
-def _aliased(scenario: Scenario, run: xr.Dataset) -> str:
-    """What the output rate could not show, as the run tells, or nothing."""
-    speeds = run["rotor_speed"].to_numpy() if "rotor_speed" in run else None
-    return unseen(scenario, run["gimbal_rate"].to_numpy(), speeds)
-
-
-def _gimbal_angles(scenario: Scenario, angles: ArrayLike | None) -> np.ndarray:
-    count = scenario.cluster.count
-    if angles is not None and isinstance(scenario.cluster, WheelCluster):
-        raise ValueError("gimbal angles: expected none, since reaction wheels have no gimbals")
-    own = scenario.cluster.gimbal_angles or np.zeros(count)
-    return vector("gimbal angles", own if angles is None else angles, count)
-
-
-def _sensitivity(name: str, given: ArrayLike) -> np.ndarray:
-    """(3, 12) of a direction, or of a matrix with zero rows for what it does not have."""
-    values = array(name, given, "3 numbers, or one to three rows of 12")
-    if values.ndim < 2:
-        direction = vector(name, given, 3)
-        if not np.any(direction):
-            raise ValueError(f"{name}: expected a direction, got zero")
-        return LineOfSight(direction=tuple(direction / np.linalg.norm(direction))).matrix()
-    if values.ndim != 2 or not 1 <= len(values) <= 3 or values.shape[1] != 12:
-        raise ValueError(f"{name}: expected one to three rows of 12 numbers, got {values.shape}")
-    if not np.any(values):
-        raise ValueError(f"{name}: expected a matrix that is not zero")
-    return np.pad(values, ((0, 3 - len(values)), (0, 0)))
-
-
-def _as_run(
-    scenario: Scenario | str,
-    mount: Mount | None,
-    duration: float | None,
-    output_rate: float | None = None,
-) -> Scenario:
-    """The scenario with what the caller asks for instead of its own values."""
-    if not isinstance(scenario, Scenario):
-        scenario = load_scenario(scenario)
-    if mount is not None:
-        choice("mount", mount, ("isolated", "rigid"))
-    if duration is not None and not isinstance(duration, str):  # a text may have a unit
-        positive("duration", duration)
-    if output_rate is not None and not isinstance(output_rate, str):
-        positive("output_rate", output_rate)
-    start_computing()
-    wanted = {
-        "isolator.mount": mount,
-        "simulation.duration": duration,
-        "simulation.output_rate": output_rate,
-    }
-    changes = {path: value for path, value in wanted.items() if value is not None}
-    return scenario.with_overrides(changes) if changes else scenario
-
-
-class _Keeping:
-    """Where a run begins, and what becomes of what it reaches."""
-
-    def __init__(self, file: Checkpoint | None, start: Reached | None):
-        self.file, self.start, self.begun = file, start, time.perf_counter()
-
-    @property
-    def keep(self) -> Callable[[Reached], None] | None:
-        return None if self.file is None else self.file.keep
-
-    def wall_time(self) -> float:
-        """[s] that the run has taken, before a resumption too."""
-        return time.perf_counter() - self.begun if self.file is None else self.file.wall_time
-
-
-def _kept(
-    solve: Callable[[Task, Callable[[float], None] | None, _Keeping], tuple[xr.Dataset, Notes]],
-    task: Task,
-    progress: Callable[[float], None] | None,
-    checkpoint: str | os.PathLike[str] | None,
-    resume: bool,
-) -> tuple[xr.Dataset, Notes]:
-    """The run, kept in a checkpoint while it goes, and what the user should know of it."""
-    if checkpoint is None:
-        if resume:
-            raise ValueError("resume needs a checkpoint")
-        return solve(task, progress, _Keeping(None, None))
-    check_space(checkpoint, task)
-    if resume and pathlib.Path(checkpoint).exists():
-        file, start = Checkpoint.resume(checkpoint, task)
-    else:
-        file, start = Checkpoint.create(checkpoint, task), None
-    try:
-        run, notes = solve(task, progress, _Keeping(file, start))
-    finally:
-        file.close()
-        if not file.rows:
-            pathlib.Path(checkpoint).unlink(missing_ok=True)
-    if file.trouble:
-        notes += (f"{checkpoint}: holds only a part of the run: {file.trouble}",)
-    return run, notes
-
-
-def _direct(
-    task: Task, progress: Callable[[float], None] | None, keeping: _Keeping
-) -> tuple[xr.Dataset, Notes]:
-    scenario = task.scenario
-    if task.joint_forces and scenario.isolator.mount == "rigid":
-        raise ValueError(
-            "joint_forces needs mount 'isolated': on a rigid mount the legs' forces are not "
-            "determined, since the plate is held by the mount and not by the legs"
-        )
-    satellite = build_satellite(scenario)
-    settings = scenario.simulation
-    state = build_initial_state(scenario, satellite)
-    refuse_coarse_tolerance(scenario, satellite, state)
-    if scenario.initial.steady and keeping.start is None:
-        state = on_periodic_solution(satellite, state)
-    solution = integrate(
-        with_noise(satellite, scenario.cluster.seeds, settings.duration),
-        state,
-        settings.duration,
-        settings.output_rate,
-        Tolerances(settings.tolerances.relative, settings.tolerances.absolute),
-        Scheme(joint_forces=task.joint_forces),
-        progress,
-        keeping.keep,
-        keeping.start,
-    )
-    return to_dataset(scenario, solution, keeping.wall_time()), ()
-
-
-def _harmonic_task(
-    scenario: Scenario,
-    points: Mapping[str, ArrayLike],
-    lines_of_sight: Mapping[str, ArrayLike],
-) -> Task:
-    at = {name: vector(f"points[{name!r}]", p, 3) for name, p in points.items()}
-    own = {name: line.matrix() for name, line in scenario.lines_of_sight.items()}
-    given = own | dict(lines_of_sight)
-    lines = {name: _sensitivity(f"lines_of_sight[{name!r}]", each) for name, each in given.items()}
-    return Task(scenario, "harmonic", points=at, lines_of_sight=lines)
-
-
-def _harmonic(
-    task: Task, progress: Callable[[float], None] | None, keeping: _Keeping
-) -> tuple[xr.Dataset, Notes]:
-    scenario = task.scenario
-    satellite = build_satellite(scenario)
-    solution = integrate_harmonic(
-        satellite,
-        build_initial_state(scenario, satellite),
-        scenario.simulation.duration,
-        scenario.simulation.output_rate,
-        steady=scenario.initial.steady,
-        view=task.view(),
-        tolerances=slow_tolerances(scenario),
-        progress=progress,
-        keep=keeping.keep,
-        start=keeping.start,
-    )
-    points, lines = task.points, task.lines_of_sight
-    run = to_dataset(scenario, solution, keeping.wall_time(), points, lines)
-    return run, solution.jitter.warnings

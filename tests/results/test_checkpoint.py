@@ -144,7 +144,7 @@ def test_nothing_is_left_of_a_run_that_could_not_begin(tmp_path):
 
 
 def test_size_is_known_before(whole):
-    task = Task(qb.scenario_of(whole), "direct")
+    task = Task(qb.scenario_of(whole), qb.Direct())
     assert expected_size(task) == pytest.approx(whole.nbytes, rel=0.01)
 
 
@@ -163,10 +163,11 @@ def test_disk_without_room_is_told_before_the_flight(tmp_path, monkeypatch):
 def test_task_comes_back_as_it_was():
     lines = {"camera": np.arange(36.0).reshape(3, 12) / 7.0}
     task = Task(
-        qb.load_scenario("zhang2012"), "harmonic", False, {"p": np.array([0.1, 0, 3])}, lines
+        qb.load_scenario("zhang2012"), qb.Harmonic(1e-6), False, {"p": np.array([0.1, 0, 3])}, lines
     )
     again = Task.from_dict(json.loads(json.dumps(task.to_dict())))
     assert not differences(again, task)
+    assert again.tolerances == task.tolerances
     assert np.array_equal(again.view().line_of_sight, task.view().line_of_sight)
 
 
@@ -174,7 +175,7 @@ def test_harmonic_run_goes_on_from_its_slow_motion(every_piece, tmp_path):
     asked = {"method": "harmonic", "duration": 60.0, "output_rate": 2.0}
     path = tmp_path / "run.nc.checkpoint"
     whole = qb.simulate("zhang2012", **asked)
-    assert expected_size(Task(qb.scenario_of(whole), "harmonic")) == pytest.approx(
+    assert expected_size(Task(qb.scenario_of(whole), qb.Harmonic())) == pytest.approx(
         whole.nbytes, rel=0.02
     )
     with pytest.warns(qb.QuietbusWarning, match="interrupted"):

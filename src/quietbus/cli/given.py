@@ -12,6 +12,7 @@ import typer
 from quietbus.cli.guard import BadInput
 
 if TYPE_CHECKING:
+    from quietbus import methods
     from quietbus.scenario import Scenario, ScenarioError
 
 OUT = Path("out")  # folder of the results, unless another is given
@@ -29,6 +30,13 @@ class Method(StrEnum):
 
     direct = "direct"
     harmonic = "harmonic"
+
+
+def method_object(word: Method) -> methods.Method:
+    """The method that the word on the command line means."""
+    from quietbus.methods import as_method  # here, so that --help need not load it
+
+    return as_method(word.value)
 
 
 ScenarioArgument = Annotated[

@@ -16,6 +16,7 @@ from quietbus.cli.given import (
     Mount,
     ScenarioArgument,
     load,
+    method_object,
 )
 from quietbus.cli.guard import BadInput, check_file, fail, make_folder
 from quietbus.cli.scenarios import checks_of, fail_unless_passed
@@ -60,13 +61,13 @@ def simulate(
     ] = False,
 ) -> None:
     """Simulate a scenario; write the run and print what one wants to know of it."""
-    checked = load(scenario, mount, duration, output_rate)
+    checked, way = load(scenario, mount, duration, output_rate), method_object(method)
     chosen = checked.isolator.mount
     name = f"{file_name(checked.name)[:LONGEST]}-{chosen}"
-    output = output or Path(f"{name}-harmonic.nc" if method == Method.harmonic else f"{name}.nc")
+    output = output or Path(f"{name}{'-harmonic' if way.jitter_apart else ''}.nc")
     check_file(output, RUN)
     checkpoint = _checkpoint_of(output, resume)
-    if joint_forces and method == Method.harmonic:
+    if joint_forces and way.jitter_apart:
         raise BadInput("--joint-forces needs --method direct")
     if joint_forces and chosen == Mount.rigid:
         raise BadInput("--joint-forces needs the isolated mount: a rigid one leaves them open")
@@ -74,6 +75,7 @@ def simulate(
     from quietbus import api
     from quietbus.results import summarize, with_worst_phases
     from quietbus.results.checkpoint import CheckpointError
+    from quietbus.runs import SimulationError
     from quietbus.solve.harmonic import ResonanceError
     from quietbus.tables import summary_table
 
@@ -83,7 +85,7 @@ def simulate(
             try:
                 run = api.simulate(
                     checked,
-                    method.value,
+                    way,
                     output_rate=checked.simulation.output_rate if output_rate else None,
                     joint_forces=joint_forces,
                     progress=lambda t: tell(chosen, t),
@@ -92,7 +94,7 @@ def simulate(
                 )
             except CheckpointError as error:
                 raise BadInput(str(error)) from None
-            except api.SimulationError as error:
+            except SimulationError as error:
                 run, failed = error.run, str(error)
             except ResonanceError as error:
                 raise BadInput(f"{scenario}: {error}") from None

@@ -56,7 +56,8 @@ def import_heavy() -> None:
             import quietbus.api
     import jax
 
-    import quietbus.api
+    import quietbus.api  # noqa: F401
+    from quietbus.asked import ImplausibleValue
 
     if jax.config.jax_disable_jit:  # type: ignore[attr-defined]
         print(
@@ -64,7 +65,7 @@ def import_heavy() -> None:
             file=sys.stderr,
         )
     # what is odd in a scenario has been told when it was read
-    warnings.simplefilter("ignore", quietbus.api.ImplausibleValue)
+    warnings.simplefilter("ignore", ImplausibleValue)
 
 
 @contextmanager

@@ -19,6 +19,7 @@ from quietbus.cli.given import (
     Mount,
     ScenarioArgument,
     load,
+    method_object,
     speed,
 )
 from quietbus.cli.guard import BadInput, fail, make_folder
@@ -144,14 +145,15 @@ def verify(
     import_heavy()
     from quietbus import api
     from quietbus.analysis.pointing.chi_square import UnsoundStatisticError
+    from quietbus.runs import SimulationError
     from quietbus.solve.harmonic import ResonanceError
 
     try:
         with progress({method.value: checked.simulation.duration}) as tell, notes():
             verification = api.verify(
-                checked, method.value, progress=lambda t: tell(method.value, t)
+                checked, method_object(method), progress=lambda t: tell(method.value, t)
             )
-    except api.SimulationError as error:
+    except SimulationError as error:
         fail(str(error))
     except ResonanceError as error:
         raise BadInput(f"{scenario}: {error}") from None

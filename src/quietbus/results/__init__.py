@@ -5,6 +5,7 @@ from quietbus.results.delivery import delivery_notes as delivery_notes
 from quietbus.results.files import load_run as load_run
 from quietbus.results.files import save_run as save_run
 from quietbus.results.origin import has_gimbals as has_gimbals
+from quietbus.results.origin import method_of as method_of
 from quietbus.results.origin import scenario_of as scenario_of
 from quietbus.results.schema import AXES as AXES
 from quietbus.results.schema import CONTROL_VARIABLES as CONTROL_VARIABLES

@@ -182,8 +182,6 @@ def read(path: str | os.PathLike[str]) -> Found:
         try:
             head, length = next(records)
             task = Task.from_dict(json.loads(head))
-            if task.method not in ("direct", "harmonic"):
-                raise ValueError(f"method {task.method!r}")
         except StopIteration:
             raise CheckpointError(f"{path}: a checkpoint without a sound beginning") from None
         except (ValueError, KeyError, TypeError, AttributeError, ScenarioError) as error:
@@ -232,13 +230,12 @@ def to_run(found: Found, source: str) -> xr.Dataset:
         f"a checkpoint: the run had come to t = {reached.time:g} s",
         True,
     )
-    if found.task.method == "direct":
-        return to_dataset(scenario, solution, found.wall_time)
+    if not found.task.method.jitter_apart:
+        return to_dataset(found.task, solution, found.wall_time)
     assert states is not None
     satellite, view = build_satellite(scenario), found.task.view()
     jitter, _ = respond(satellite, solution.time, states, view)
-    points, lines = found.task.points, found.task.lines_of_sight
-    return to_dataset(scenario, HarmonicSolution(solution, jitter), found.wall_time, points, lines)
+    return to_dataset(found.task, HarmonicSolution(solution, jitter), found.wall_time)
 
 
 def _append(file: BinaryIO, record: Any) -> None:
@@ -276,7 +273,7 @@ def _joined(task: Task, parts: list[dict[str, np.ndarray]]) -> tuple[Reached | N
         if name.startswith(("outputs.", "states."))
     }
     outputs = _tree(Outputs, whole, "outputs")
-    states = _tree(State, whole, "states") if task.method == "harmonic" else None
+    states = _tree(State, whole, "states") if task.method.jitter_apart else None
     reached, step, steps, rejected, wall_time = last["numbers"].tolist()
     state = jax.tree.map(jnp.asarray, _tree(State, last, "state"))
     kept = (outputs, states)

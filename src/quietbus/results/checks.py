@@ -8,11 +8,11 @@ import h5py
 import numpy as np
 import xarray as xr
 
-from quietbus.results.origin import scenario_of
+from quietbus.methods import METHODS
+from quietbus.results.origin import method_of, scenario_of
 from quietbus.results.schema import DIMENSIONS, JITTER_VARIABLES, VARIABLES, described
 from quietbus.scenario import Scenario
 
-METHODS = ("direct", "harmonic")
 STATUSES = ("complete", "stopped", "interrupted")
 TEXTS = ("scenario", "mount", "method", "status")  # attributes without which a run is none
 PACKED = 1100  # no file holds more bytes for each of its own
@@ -82,7 +82,7 @@ def check_run(run: xr.Dataset) -> None:
     if not wrong:
         scenario = _scenario(run)
         wrong += [*_sizes(run, scenario), *_variables(run)]
-    if not wrong and run.attrs["method"] == "harmonic":
+    if not wrong and method_of(run).jitter_apart:
         wrong += _harmonic(run)
     if wrong:
         more = f"; and {len(wrong) - 5} more" if len(wrong) > 5 else ""
@@ -95,7 +95,7 @@ def _attributes(run: xr.Dataset) -> Iterator[str]:
             yield f"its attribute {name} is no text"
     known: dict[str, tuple[str, ...]] = {
         "mount": ("isolated", "rigid"),
-        "method": METHODS,
+        "method": tuple(METHODS),
         "status": STATUSES,
     }
     for name, values in known.items():
@@ -133,7 +133,7 @@ def _scenario(run: xr.Dataset) -> Scenario:
 def _sizes(run: xr.Dataset, scenario: Scenario) -> Iterator[str]:
     expected: dict[str, Any] = {name: labels for name, (_, labels, _) in DIMENSIONS.items()}
     expected |= {"cmg": range(scenario.cluster.count), "leg": range(scenario.isolator.legs.count)}
-    if run.attrs["method"] == "harmonic":
+    if method_of(run).jitter_apart:
         expected["order"] = scenario.cluster.orders
     for name, labels in expected.items():
         wanted = f"expected {len(labels)} of its scenario" if name in ("cmg", "leg") else "expected"

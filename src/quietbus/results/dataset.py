@@ -2,7 +2,6 @@
 
 import datetime
 import importlib.metadata
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -22,29 +21,23 @@ from quietbus.results.schema import (
     VARIABLES,
     per_hertz,
 )
+from quietbus.results.task import Task
 from quietbus.scenario import Scenario
-from quietbus.solve.direct import SLOW, Scheme, Solution, Tolerances
-from quietbus.solve.harmonic import TOLERANCES, HarmonicSolution, Jitter
+from quietbus.solve.direct import SLOW, Scheme, Solution
+from quietbus.solve.harmonic import HarmonicSolution, Jitter
 
 
-def to_dataset(
-    scenario: Scenario,
-    solution: Solution | HarmonicSolution,
-    wall_time: float,
-    points: Mapping[str, Any] | None = None,
-    lines_of_sight: Mapping[str, Any] | None = None,
-) -> xr.Dataset:
+def to_dataset(task: Task, solution: Solution | HarmonicSolution, wall_time: float) -> xr.Dataset:
     """A run as a dataset.
 
     Args:
-        scenario: as it was run, mount and output rate included.
+        task: what the run was asked for.
         wall_time: [s].
-        points, lines_of_sight: what a harmonic run looked at, by name.
     """
+    scenario, points, lines_of_sight = task.scenario, task.points, task.lines_of_sight
     jitter = solution.jitter if isinstance(solution, HarmonicSolution) else None
-    tolerances: Any = scenario.simulation.tolerances
     if isinstance(solution, HarmonicSolution):
-        solution, tolerances = solution.slow, slow_tolerances(scenario)
+        solution = solution.slow
     data = {
         name: _variable(getattr(solution.outputs, name), *VARIABLES[name]) for name in VARIABLES
     }
@@ -108,27 +101,19 @@ def to_dataset(
         "title": f"{scenario.name}, {scenario.isolator.mount}",
         "scenario": text_of(scenario),
         "mount": scenario.isolator.mount,
-        "method": "direct" if jitter is None else "harmonic",
+        "method": task.method.word,
         "status": status,
         "stop_reason": solution.stopped or "",
         "quietbus_version": importlib.metadata.version("quietbus"),
         "solver": f"diffrax {importlib.metadata.version('diffrax')} {scheme.solver.__name__}",
-        "relative_tolerance": tolerances.relative,
-        "absolute_tolerance": tolerances.absolute,
+        "relative_tolerance": task.tolerances.relative,
+        "absolute_tolerance": task.tolerances.absolute,
         "steps": solution.steps,
         "rejected_steps": solution.rejected,
         "wall_time_s": wall_time,
         "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
     }
     return xr.Dataset(data, coordinates, attributes)
-
-
-def slow_tolerances(scenario: Scenario) -> Tolerances:
-    """Of a harmonic run's slow motion: the scenario's, or coarser ones where it has the default."""
-    given = scenario.simulation.tolerances
-    if given == type(given)():
-        return TOLERANCES
-    return Tolerances(given.relative, given.absolute)
 
 
 def _rotor_lines(scenario: Scenario, outputs: Outputs) -> tuple[np.ndarray, np.ndarray]:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from quietbus.methods import METHODS, Method
 from quietbus.scenario import Scenario
 from quietbus.scenario.wheels import WheelCluster
 from quietbus.words import shown
@@ -71,6 +72,11 @@ def scenario_of(run: xr.Dataset) -> Scenario:
     """
     refuse_no_run(run)
     return scenario_from(run.attrs["scenario"], "the run's scenario")
+
+
+def method_of(run: xr.Dataset) -> type[Method]:
+    """By which kind of method a run was made."""
+    return METHODS[run.attrs["method"]]
 
 
 def has_gimbals(run: xr.Dataset) -> bool:

@@ -38,7 +38,7 @@ def expected_size(task: Task) -> int:
     if task.joint_forces:
         tables.append(JOINT_VARIABLES)
     dimensions = [inner for table in tables for inner, _, _ in table.values()]
-    if task.method == "harmonic":
+    if task.method.jitter_apart:
         for inner, _, _ in JITTER_VARIABLES.values():
             dimensions += [("cmg", "order", *inner)] * 2 + [inner] * len(COMBINED)
     row = 1 + sum(math.prod(sizes[name] for name in inner) for inner in dimensions)

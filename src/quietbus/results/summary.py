@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from quietbus.analysis.signals.residual import residual, shows
-from quietbus.results.origin import rotors, scenario_of
+from quietbus.results.origin import method_of, rotors, scenario_of
 from quietbus.results.schema import WORST_PHASES
 from quietbus.scenario import Scenario
 from quietbus.scenario.wheels import WheelCluster
@@ -44,7 +44,7 @@ def with_worst_phases(run: xr.Dataset, rate: np.ndarray | None) -> xr.Dataset:
     Args:
         rate: (3,) [rad/s], as of ``quietbus.worst_over_phases``.
     """
-    if rate is None or run.attrs["method"] == "harmonic":
+    if rate is None or method_of(run).jitter_apart:
         return run
     meaning = "sum of the amplitudes of the bus rate's lines at the end, any rotor phases"
     described = {"units": "rad/s", "long_name": meaning}
@@ -64,7 +64,7 @@ def summarize(run: xr.Dataset) -> Summary:
     error = np.linalg.norm(run["attitude_error"].to_numpy(), axis=1)
     jitter = rms = slow = None
     note = "not shown: the output rate is too low for the rotors"
-    if run.attrs["method"] == "harmonic":
+    if method_of(run).jitter_apart:
         last = time >= time[-1] - 1.0
         jitter = run["bus_rate_jitter_envelope"].to_numpy()[last].max(axis=0)
         rms = run["bus_rate_jitter_rms"].to_numpy()[last].max(axis=0)
@@ -110,7 +110,7 @@ def rotor_notes(run: xr.Dataset) -> list[str]:
         return said
     scenario, time = scenario_of(run), run["time"].to_numpy()
     speeds = np.abs(run["rotor_speed"].to_numpy())
-    if run.attrs["method"] == "direct" and not aliasing(scenario):
+    if not method_of(run).jitter_apart and not aliasing(scenario):
         said += filter(None, [aliasing(scenario, float(speeds.max()))])
     cluster = scenario.cluster
     if not isinstance(cluster, WheelCluster):

@@ -8,8 +8,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from quietbus.dynamics.vibration import View
+from quietbus.methods import METHODS, Method
 from quietbus.results.origin import scenario_from, text_of
 from quietbus.scenario import Scenario
+from quietbus.scenario.schema import Tolerances
 
 
 @dataclass(frozen=True)
@@ -17,10 +19,15 @@ class Task:
     """What a run was asked for."""
 
     scenario: Scenario  # as it is run, mount and output rate included
-    method: str
+    method: Method
     joint_forces: bool = False
     points: Mapping[str, np.ndarray] = field(default_factory=dict)  # (3,) [m] by name
     lines_of_sight: Mapping[str, np.ndarray] = field(default_factory=dict)  # (3, 12) by name
+
+    @property
+    def tolerances(self) -> Tolerances:
+        """Of the integrator."""
+        return self.method.tolerances(self.scenario)
 
     def view(self) -> View:
         """Points and lines of sight of a harmonic run."""
@@ -33,7 +40,9 @@ class Task:
         named = lambda arrays: {name: np.asarray(a).tolist() for name, a in arrays.items()}  # noqa: E731
         return {
             "scenario": text_of(self.scenario),
-            "method": self.method,
+            "method": self.method.word,
+            "relative_tolerance": self.tolerances.relative,
+            "absolute_tolerance": self.tolerances.absolute,
             "joint_forces": self.joint_forces,
             "points": named(self.points),
             "lines_of_sight": named(self.lines_of_sight),
@@ -45,7 +54,7 @@ class Task:
         named = lambda lists: {name: np.array(given) for name, given in lists.items()}  # noqa: E731
         return cls(
             scenario_from(data["scenario"], "the checkpoint's scenario"),
-            data["method"],
+            METHODS[data["method"]](data.get("relative_tolerance"), data.get("absolute_tolerance")),
             data["joint_forces"],
             named(data["points"]),
             named(data["lines_of_sight"]),

@@ -62,19 +62,23 @@ def _declared(scenario: Scenario, speed: np.ndarray | None = None) -> Iterator[t
             yield spectrum.frequency[-1], f"the end of the broadband {words} of rotor {j}"
 
 
-def refuse_coarse_tolerance(scenario: Scenario, satellite: Satellite, state: State) -> None:
+def refuse_coarse_tolerance(
+    scenario: Scenario, satellite: Satellite, state: State, tolerance: float
+) -> None:
     """Raise ScenarioError where the absolute tolerance hides a declared order.
 
     The criterion: the order's steady amplitude, at the start, of the bus's rate [rad/s] or
     velocity [m/s] is to be no less than the absolute tolerance of one step (SI units). Amplitudes
     then come out to about 1e-3 or better.
+
+    Args:
+        tolerance: absolute, of one step.
     """
     if satellite.disturbance is None:
         return
     size = steady_speeds(satellite, state).max(axis=-1)
     there = np.any(np.asarray(satellite.disturbance.coefficient) > 0.0, axis=-1)
     there &= np.asarray(satellite.cluster.rotor_speed)[:, None] != 0.0
-    tolerance = scenario.simulation.tolerances.absolute
     hidden = there & (size < tolerance)
     if not hidden.any():
         return

@@ -17,7 +17,8 @@ from quietbus.analysis.pointing.motion import ImageMotion, Lines, SampledSignal
 from quietbus.analysis.pointing.noise import Noise
 from quietbus.analysis.pointing.windows import MOST_PERIODS, Metric, largest_change
 from quietbus.arguments import choice, count
-from quietbus.results import AXES, aliasing, scenario_of
+from quietbus.methods import Method
+from quietbus.results import AXES, aliasing, method_of, scenario_of
 from quietbus.scenario import Problem, Scenario, ScenarioError
 from quietbus.scenario.control import NoSteering
 
@@ -105,8 +106,8 @@ class Verification:
 
     def __post_init__(self) -> None:
         time = self.run["time"].to_numpy()
-        check_requirements(self.scenario, self.run.attrs["method"], float(time[-1]))
-        if self.run.attrs["method"] == "harmonic":
+        check_requirements(self.scenario, method_of(self.run), float(time[-1]))
+        if method_of(self.run).jitter_apart:
             try:
                 rotors_of(self.run, self.scenario, self._judged_time)
             except ValueError as error:
@@ -306,7 +307,7 @@ def _stretch(requirement: Any, last: float) -> tuple[float, float]:
     return (max(0.0, end - JUDGED * last) if start is None else start), end
 
 
-def check_requirements(scenario: Scenario, method: str, last: float) -> None:
+def check_requirements(scenario: Scenario, method: Method | type[Method], last: float) -> None:
     """Refuse requirements that a run from 0 to ``last`` [s] cannot judge, before it is made.
 
     Raises:
@@ -315,13 +316,13 @@ def check_requirements(scenario: Scenario, method: str, last: float) -> None:
     """
     problems = []
     nyquist = 0.5 * scenario.simulation.output_rate
-    too_coarse = "" if method == "harmonic" else aliasing(scenario)
+    too_coarse = "" if method.jitter_apart else aliasing(scenario)
     if too_coarse:
         text = f"{too_coarse}. Use method 'harmonic', or raise simulation.output_rate"
         problems.append(Problem(text, ("requirements",)))
-    if method == "harmonic" and scenario.cluster.gimbal_motor and _gimbals_move(scenario):
+    if method.jitter_apart and scenario.cluster.gimbal_motor and _gimbals_move(scenario):
         problems.append(Problem(RIPPLE, ("requirements",)))
-    highest = _highest_noise(scenario) if method == "harmonic" else 0.0
+    highest = _highest_noise(scenario) if method.jitter_apart else 0.0
     for i, requirement in enumerate(scenario.requirements):
         metric = _metric(requirement)
         if metric.span * highest > MOST_PERIODS:
@@ -335,7 +336,7 @@ def check_requirements(scenario: Scenario, method: str, last: float) -> None:
             check_stretch(0.0, last, metric, _stretch(requirement, last))
         except ValueError as error:
             problems.append(Problem(str(error), ("requirements", i)))
-        if method != "harmonic" and metric.above >= nyquist:
+        if not method.jitter_apart and metric.above >= nyquist:
             text = (
                 f"expected less than {nyquist:g} Hz, half the output rate; got {metric.above:g} Hz"
             )
@@ -425,7 +426,7 @@ def image_motion(
     line = scenario.lines_of_sight[name]
     time = run["time"].to_numpy()
     signal = SampledSignal(time, _errors(run, scenario) @ (line.image() @ line.matrix()).T)
-    if run.attrs["method"] != "harmonic":
+    if not method_of(run).jitter_apart:
         return ImageMotion(signal)
     amplitude, shift = (
         run[f"line_of_sight_jitter_{part}"]
