@@ -16,9 +16,10 @@ from importlib.metadata import version
 import numpy as np
 
 import quietbus as qb
-from quietbus.analysis.control.coupled import analyze_coupled, controlled
+from quietbus.analysis.control.controlled import controlled
+from quietbus.analysis.control.coupled import analyze_coupled
 from quietbus.analysis.control.designs import map_designs
-from quietbus.analysis.control.loop import analyze_loop
+from quietbus.analysis.control.margins import analyze_loop
 from quietbus.studies.linear import Study
 
 REPEATS = 20

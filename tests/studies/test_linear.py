@@ -8,7 +8,8 @@ import pytest
 
 import quietbus as qb
 from oracles.pages import assert_rounds, table
-from quietbus.analysis.control.loop import attitude_loop, stable_gain_range
+from quietbus.analysis.control.loop import attitude_loop
+from quietbus.analysis.control.nyquist import stable_gain_range
 from quietbus.dynamics.linearize import platform_inertia
 from quietbus.studies.linear import at_height, without_leg_mass
 

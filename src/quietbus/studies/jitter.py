@@ -11,7 +11,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from quietbus.analysis.control.channels import json_ready
 from quietbus.analysis.jitter.lines import (
     AT_REST,
     KINDS,
@@ -38,6 +37,7 @@ from quietbus.arguments import count as whole
 from quietbus.build import build_satellite
 from quietbus.dynamics.vibration import NOTHING_SEEN, Vibration
 from quietbus.model.satellite import Satellite
+from quietbus.plain import json_ready
 from quietbus.scenario import Scenario, ScenarioError
 from quietbus.solve.harmonic import ResonanceError, refuse_resonance
 from quietbus.solve.noise import Broadband, noise_spectra

@@ -8,25 +8,17 @@ from typing import Any
 import equinox as eqx
 import numpy as np
 
-from quietbus.analysis.control.channels import Channels, channels, hexapod_isolator, json_ready
-from quietbus.analysis.control.coupled import (
-    ControlledSatellite,
-    CoupledAnalysis,
-    analyze_coupled,
-    controlled,
-    stable_gain_range,
-)
+from quietbus.analysis.control.channels import Channels, channels
+from quietbus.analysis.control.controlled import ControlledSatellite, controlled
+from quietbus.analysis.control.coupled import CoupledAnalysis, analyze_coupled, stable_gain_range
 from quietbus.analysis.control.designs import DesignRule, corner_rule
+from quietbus.analysis.control.hexapod import hexapod_isolator
 from quietbus.analysis.control.isolator import SingleAxisIsolator
-from quietbus.analysis.control.loop import (
-    PID,
-    Loop,
-    LoopAnalysis,
-    analyze_loop,
-    attitude_loop,
-    nearest_range,
-)
+from quietbus.analysis.control.loop import Loop, attitude_loop
+from quietbus.analysis.control.margins import LoopAnalysis, analyze_loop
 from quietbus.analysis.control.modes import Mode, fixed_base_modes, free_modes
+from quietbus.analysis.control.pid import PID
+from quietbus.analysis.control.stability import nearest_range
 from quietbus.analysis.control.transmissibility import Places, Transmissibility, transmissibility
 from quietbus.arguments import array, choice
 from quietbus.build import build_satellite
@@ -41,6 +33,7 @@ from quietbus.dynamics.linearize import (
 )
 from quietbus.model.satellite import Satellite
 from quietbus.model.variants import without_friction, without_leg_mass, without_rotation
+from quietbus.plain import json_ready
 from quietbus.scenario import Scenario
 from quietbus.spatial.rotation import quaternion_to_matrix
 

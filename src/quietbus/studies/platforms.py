@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.integrate import trapezoid
 
 from quietbus.analysis.control.coupled import CoupledAnalysis, analyze_coupled
-from quietbus.analysis.control.loop import PID
+from quietbus.analysis.control.pid import PID
 from quietbus.analysis.jitter.lines import AT_REST, Combined, combine
 from quietbus.analysis.jitter.platforms import Platforms
 from quietbus.arguments import choice, vector

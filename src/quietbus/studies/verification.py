@@ -10,7 +10,6 @@ import numpy as np
 import xarray as xr
 from scipy.spatial.transform import Rotation
 
-from quietbus.analysis.control.channels import json_ready
 from quietbus.analysis.pointing.chi_square import UnsoundStatisticError
 from quietbus.analysis.pointing.metrics import Statistic, check_stretch, contributions, evaluate
 from quietbus.analysis.pointing.motion import ImageMotion, Lines, SampledSignal
@@ -18,6 +17,7 @@ from quietbus.analysis.pointing.noise import Noise
 from quietbus.analysis.pointing.windows import MOST_PERIODS, Metric, largest_change
 from quietbus.arguments import choice, count
 from quietbus.methods import Method
+from quietbus.plain import json_ready
 from quietbus.results import AXES, aliasing, method_of, scenario_of
 from quietbus.scenario import Problem, Scenario, ScenarioError
 from quietbus.scenario.control import NoSteering

@@ -8,13 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from quietbus.analysis.control.channels import (
-    SymbolicChannel,
-    channels,
-    hexapod_isolator,
-    minus_3db_frequency,
-    peak,
-)
+from quietbus.analysis.control.channels import channels
+from quietbus.analysis.control.hexapod import hexapod_isolator
+from quietbus.analysis.control.rational import minus_3db_frequency, peak
+from quietbus.analysis.control.symbolic import SymbolicChannel
 
 R3 = np.sqrt(3.0)
 UPPER = np.array(

@@ -9,18 +9,14 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from quietbus.analysis.control.channels import SymbolicChannel
 from quietbus.analysis.control.designs import corner_rule, map_designs
-from quietbus.analysis.control.loop import (
-    PID,
-    Loop,
-    analyze_loop,
-    attitude_loop,
-    nearest_range,
-    nyquist_counts,
-    stable_gain_range,
-)
+from quietbus.analysis.control.loop import Loop, attitude_loop
 from quietbus.analysis.control.loop_response import frequency_response, root_locus
+from quietbus.analysis.control.margins import analyze_loop
+from quietbus.analysis.control.nyquist import nyquist_counts, stable_gain_range
+from quietbus.analysis.control.pid import PID
+from quietbus.analysis.control.stability import nearest_range
+from quietbus.analysis.control.symbolic import SymbolicChannel
 
 INERTIA = 1100.0
 PRINTED = SymbolicChannel((1.0, 0.036), (70.3, 3.69, 0.036))

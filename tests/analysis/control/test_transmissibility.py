@@ -7,7 +7,7 @@ import numpy as np
 
 import quietbus as qb
 from oracles.satellites import paper_satellite
-from quietbus.analysis.control.channels import hexapod_isolator
+from quietbus.analysis.control.hexapod import hexapod_isolator
 from quietbus.analysis.control.transmissibility import Places, transmissibility
 from quietbus.dynamics.linearize import OperatingPoint, clamped, linearize, platform_inertia
 from quietbus.spatial.rotation import quaternion_to_matrix

@@ -1,103 +1,18 @@
-"""The attitude loop closed on the whole linearised satellite, all axes at once.
-
-What the paper's per-axis analysis leaves out is in: the free bus, the platform's place on it,
-products of inertia, legs with mass, joint friction, rotor momentum, the gimbal servo.
-"""
+"""Gain range and margins of the loop around the whole satellite, by its eigenvalues."""
 
 import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq, minimize, minimize_scalar
+from scipy.optimize import brentq
 
-from quietbus.analysis.control.channels import json_ready
-from quietbus.analysis.control.loop import PID, between, count_unstable, gain_verdict
-from quietbus.dynamics.linearize import LinearModel
+from quietbus.analysis.control.controlled import ControlledSatellite
+from quietbus.analysis.control.disk_margin import disk_margin
+from quietbus.analysis.control.stability import between, count_unstable, gain_verdict
+from quietbus.plain import json_ready
 
 REACH = 1e6  # [-] gains further than this factor from the chosen one are taken for rounding
-
-
-@dataclass(frozen=True)
-class ControlledSatellite:
-    """Loop ``u = -(Kp theta + Ki q + Kd w)``, ``dq/dt = theta`` around a linear satellite.
-
-    K scales the whole controller: Kd, or Kp without Kd, as in the analysis per axis.
-
-    Only states that something depends on are kept: position, velocity and, at rest, gimbal angles
-    are integrals that act on nothing.
-    """
-
-    A: np.ndarray  # (n, n) satellite and integral of the error, loop open
-    B: np.ndarray  # (n, 3) by control torque [N m]
-    F: np.ndarray  # (3, n) feedback at unit gain K
-    gain: float  # the chosen K [N m s/rad]
-
-    def closed(self, gain: float | np.ndarray) -> np.ndarray:
-        """System matrix (..., n, n) of the closed loop at gain K."""
-        gain = np.asarray(gain, dtype=float)[..., None, None]
-        return self.A - gain * (self.B @ self.F)
-
-    def poles(self, gain: float | None = None) -> np.ndarray:
-        """Closed-loop poles [rad/s] at gain K, by default the chosen one."""
-        return np.linalg.eigvals(self.closed(self.gain if gain is None else gain))
-
-    def abscissa(self, gain: float | np.ndarray) -> np.ndarray:
-        """Largest real part of the closed-loop poles [1/s]; negative where stable."""
-        return np.max(np.linalg.eigvals(self.closed(gain)).real, axis=-1)
-
-    def loop(self, omega: np.ndarray) -> np.ndarray:
-        """Loop transfer matrix (frequency, 3, 3) at the actuator, at frequencies [rad/s]."""
-        s = 1j * np.atleast_1d(omega)[:, None, None]
-        resolvent = np.linalg.solve(s * np.eye(len(self.A)) - self.A, self.B.astype(complex))
-        return self.gain * (self.F @ resolvent)
-
-    def axis_loops(self, omega: np.ndarray) -> np.ndarray:
-        """Loop of each axis (frequency, 3) with the other two closed, at frequencies [rad/s]."""
-        L = self.loop(omega)
-        columns = []
-        for i in range(3):
-            others = [j for j in range(3) if j != i]
-            closed = np.eye(2) + L[:, others][:, :, others]
-            through = np.linalg.solve(closed, L[:, others, i, None])[..., 0]
-            columns.append(L[:, i, i] - np.einsum("fj,fj->f", L[:, i, others], through))
-        return np.stack(columns, axis=1)
-
-
-def controlled(model: LinearModel, pid: PID) -> ControlledSatellite:
-    """Attitude control around a linear satellite.
-
-    Args:
-        model: with input ``control_torque`` and outputs ``bus_attitude``, ``bus_rate``.
-        pid: gains, of which at least one is not zero.
-
-    Raises:
-        ValueError: all gains are zero, so that there is no loop.
-    """
-    if not pid.gain:
-        raise ValueError("pid: expected a gain that is not zero; without control there is no loop")
-    plant = model.select(["control_torque"], ["bus_attitude", "bus_rate"])
-    kept = _states_that_matter(plant)
-    A, B, C = plant.A[np.ix_(kept, kept)], plant.B[kept], plant.C[:, kept]
-    attitude, rate = C[:3], C[3:]
-    F = (pid.kp * attitude + pid.kd * rate) / pid.gain
-    if pid.ki:  # without it the integral acts on nothing
-        n, zero = len(A), np.zeros((3, 3))
-        A = np.block([[A, np.zeros((n, 3))], [attitude, zero]])
-        B = np.vstack([B, zero])
-        F = np.hstack([F, pid.ki / pid.gain * np.eye(3)])
-    return ControlledSatellite(A, B, F, pid.gain)
-
-
-def _states_that_matter(model: LinearModel) -> np.ndarray:
-    """Indices of the states on which an output depends, directly or through other states."""
-    linked = (np.abs(model.A) > 1e-12 * np.abs(model.A).max()).astype(int)
-    matter = np.any(model.C != 0.0, axis=0)
-    while True:
-        grown = matter | (matter @ linked > 0)
-        if np.array_equal(grown, matter):
-            return np.flatnonzero(matter)
-        matter = grown
 
 
 @dataclass(frozen=True)
@@ -222,72 +137,3 @@ def _limit(system: ControlledSatellite, low: float, high: float, critical: np.nd
         if (abscissa(a) < 0.0) != (abscissa(b) < 0.0):
             return float(np.exp(brentq(abscissa, a, b, xtol=1e-15)))
     return float(guess[0])  # on either side poles stay on the axis
-
-
-def disk_margin(system: ControlledSatellite) -> float:
-    """Symmetric disk margin alpha with independent changes in the three axes.
-
-    ``alpha = 1 / max_w mu(S - I/2)``, S the sensitivity at the actuator. For three scalar blocks
-    the structured singular value mu is the least over scalings D of the largest singular value of
-    D M D^-1, exactly (Packard and Doyle 1993). Each axis may be multiplied by any complex number
-    in the disk through (2-alpha)/(2+alpha) and its inverse before the loop becomes unstable.
-    """
-    poles = system.poles()
-    sizes, widths = np.abs(poles[np.abs(poles) > 1e-9]), np.linspace(-4.0, 4.0, 17)
-    grid = np.geomspace(sizes.min() / 10.0, sizes.max() * 10.0, 200)
-    peaks = poles[poles.imag > 0.0]
-    around = (peaks.imag + np.abs(peaks.real) * widths[:, None]).ravel()
-    omega = np.unique(np.concatenate([grid, around[around > grid[0]]]))
-    upper = np.linalg.norm(_balanced(_symmetric(system, omega)), 2, axis=(1, 2))
-
-    def mu(log_omega: float) -> float:
-        return _mu(_symmetric(system, np.exp([log_omega]))[0])
-
-    best = 0.0
-    for i in np.argsort(upper)[::-1]:  # the bound is tight enough to leave few to refine
-        if upper[i] <= best * (1.0 + 1e-9):
-            break
-        low, high = np.log(omega[[max(i - 1, 0), min(i + 1, len(omega) - 1)]])
-        found = minimize_scalar(
-            lambda x: -mu(x), bounds=(low, high), method="bounded", options={"xatol": 1e-5}
-        )
-        best = max(best, -float(found.fun), mu(float(np.log(omega[i]))))
-    return 1.0 / best
-
-
-def _symmetric(system: ControlledSatellite, omega: np.ndarray) -> np.ndarray:
-    identity = np.eye(3)
-    return np.linalg.inv(identity + system.loop(omega)) - 0.5 * identity
-
-
-def _balanced(M: np.ndarray) -> np.ndarray:
-    """Matrices (..., 3, 3) scaled by diagonals so that rows and columns weigh alike (Osborne)."""
-    M = M.copy()
-    for _ in range(8):
-        for i in range(3):
-            others = [j for j in range(3) if j != i]
-            row = np.linalg.norm(M[:, i, others], axis=1)
-            column = np.linalg.norm(M[:, others, i], axis=1)
-            scale = np.sqrt(np.maximum(column, 1e-300) / np.maximum(row, 1e-300))
-            M[:, i, :] *= scale[:, None]
-            M[:, :, i] /= scale[:, None]
-    return M
-
-
-def _mu(M: np.ndarray) -> float:
-    """Structured singular value of a 3 x 3 matrix for three complex scalars."""
-    M = _balanced(M[None])[0]
-
-    def norm(logs: np.ndarray) -> tuple[float, np.ndarray]:
-        """Largest singular value of D M D^-1, and its slopes by the logarithms of D."""
-        d = np.exp(np.append(logs, 0.0))
-        left, sizes, right = np.linalg.svd(d[:, None] * M / d)
-        slopes = np.abs(left[:, 0]) ** 2 - np.abs(right[0]) ** 2
-        return float(sizes[0]), sizes[0] * slopes[:2]
-
-    smooth = minimize(norm, np.zeros(2), jac=True, method="BFGS", options={"gtol": 1e-8})
-    if np.max(np.abs(smooth.jac)) < 1e-7 * smooth.fun:
-        return float(smooth.fun)
-    # two singular values meet at the least one, which then has an edge
-    edge = {"xatol": 1e-9, "fatol": 1e-12}
-    return float(minimize(lambda x: norm(x)[0], smooth.x, method="Nelder-Mead", options=edge).fun)

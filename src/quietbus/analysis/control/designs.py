@@ -10,9 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from quietbus.analysis.control.channels import SymbolicChannel, json_ready
-from quietbus.analysis.control.loop import PID, analyze_loop, attitude_loop, nearest_range
+from quietbus.analysis.control.loop import attitude_loop
+from quietbus.analysis.control.margins import analyze_loop
+from quietbus.analysis.control.pid import PID
 from quietbus.analysis.control.rational import Array, peak
+from quietbus.analysis.control.stability import nearest_range
+from quietbus.analysis.control.symbolic import SymbolicChannel
+from quietbus.plain import json_ready
 
 ABOUT_A_DECADE = 5.0
 """[-] Least corner over bandwidth that passes the design rule; the paper's own is 6.7."""

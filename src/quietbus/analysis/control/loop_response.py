@@ -9,13 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
-from quietbus.analysis.control.loop import (
-    Loop,
-    frequency_grid,
-    gain_crossings,
-    phase_crossings,
-    stable_gain_range,
-)
+from quietbus.analysis.control.crossings import frequency_grid, gain_crossings, phase_crossings
+from quietbus.analysis.control.loop import Loop
+from quietbus.analysis.control.nyquist import stable_gain_range
 from quietbus.analysis.control.rational import Array
 
 

@@ -16,9 +16,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from quietbus.analysis.control.coupled import ControlledSatellite, controlled
-from quietbus.analysis.control.loop import PID
+from quietbus.analysis.control.controlled import ControlledSatellite, controlled
 from quietbus.analysis.control.modes import RIGID_BODY
+from quietbus.analysis.control.pid import PID
 from quietbus.analysis.jitter.lines import at_rest
 from quietbus.dynamics.linearize import AXES, Actuator, LinearModel, steering_commands
 from quietbus.dynamics.vibration import (

@@ -7,8 +7,10 @@ from matplotlib.axes import Axes
 from scipy.optimize import brentq
 
 from quietbus.analysis.control.isolator import transmissibility, transmissibility_peak
-from quietbus.analysis.control.loop import PID, Loop, LoopAnalysis, analyze_loop, attitude_loop
+from quietbus.analysis.control.loop import Loop, attitude_loop
 from quietbus.analysis.control.loop_response import frequency_response, root_locus
+from quietbus.analysis.control.margins import LoopAnalysis, analyze_loop
+from quietbus.analysis.control.pid import PID
 from quietbus.dynamics.linearize import platform_inertia
 from quietbus.plots.style import COLOURS, DASHES, new_figure, share_legend
 from quietbus.reproduce.parts import Findings

@@ -8,7 +8,8 @@ import numpy as np
 from jaxtyping import Array
 
 from quietbus.analysis.control.channels import Channel
-from quietbus.analysis.control.coupled import analyze_coupled, controlled
+from quietbus.analysis.control.controlled import controlled
+from quietbus.analysis.control.coupled import analyze_coupled
 from quietbus.analysis.control.rational import peak
 from quietbus.dynamics.kinematics import PlateMotion, leg_motion
 from quietbus.dynamics.linearize import linearize
