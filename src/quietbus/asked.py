@@ -43,21 +43,19 @@ def scenario_asked(
     found = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     start_computing()
     wanted = {
-        "isolator.mount": (mount, lambda name, value: choice(name, value, ("isolated", "rigid"))),
-        "simulation.duration": (duration, _number_or_text),
-        "simulation.output_rate": (output_rate, _number_or_text),
+        "isolator.mount": mount,
+        "simulation.duration": duration,
+        "simulation.output_rate": output_rate,
     }
-    changes = {path: each for path, each in wanted.items() if each[0] is not None}
-    for path, (value, check) in changes.items():
-        check(path.rpartition(".")[2], value)
-    if not changes:
-        return found
-    return found.with_overrides({path: value for path, (value, _) in changes.items()})
+    changes = {path: _checked(path, value) for path, value in wanted.items() if value is not None}
+    return found.with_overrides(changes) if changes else found
 
 
-def _number_or_text(name: str, value: Any) -> None:
-    if not isinstance(value, str):  # a text may have a unit
-        positive(name, value)
+def _checked(path: str, value: Any) -> Any:
+    name = path.rpartition(".")[2]
+    if name == "mount":
+        return choice(name, value, ("isolated", "rigid"))
+    return value if isinstance(value, str) else positive(name, value)  # a text may have a unit
 
 
 def angles_asked(scenario: Scenario, angles: ArrayLike | None) -> np.ndarray:

@@ -47,7 +47,7 @@ def test_scenario_is_the_run_s_to_the_letter(name):
 
 def test_nothing_of_a_run_becomes_markup():
     run = synthetic(count=100, name=HOSTILE, status=HOSTILE, reason=HOSTILE)
-    for name in ("method", "solver", "created", "quietbus_version"):
+    for name in ("solver", "created", "quietbus_version"):
         run.attrs[name] = HOSTILE
     run.attrs[HOSTILE] = HOSTILE
     page = report_page(run)
@@ -58,6 +58,16 @@ def test_nothing_of_a_run_becomes_markup():
     shown = harmonic()
     shown["bus_rate_jitter_rms"].attrs["long_name"] = HOSTILE
     assert "<script>alert" not in report_page(shown)
+
+
+def test_a_run_of_an_unknown_method_is_refused_by_name():
+    run = synthetic(count=100)
+    run.attrs["method"] = "\x1b[2Jmagic"
+    with pytest.raises(
+        ValueError, match=r"run: expected the method direct or harmonic, got '"
+    ) as no:
+        report_page(run)
+    assert "\x1b" not in str(no.value)
 
 
 def test_numbers_are_those_of_the_summary():

@@ -106,6 +106,9 @@ def test_what_is_kept_is_bounded_and_the_last_used_stays(parses, monkeypatch):
     assert [text.partition("\n")[0] for text in origin._kept] == [
         f"name: number{i}" for i in (5, 0, 6)
     ]
+    monkeypatch.setattr(origin, "MOST_LETTERS", 1)
+    origin.text_of(scenario("number7"))
+    assert len(origin._kept) == 1  # however long it is
     assert not parses
     assert origin.scenario_from(texts[1], "gone").name == "number1"
     assert len(parses) == 1

@@ -195,6 +195,11 @@ def test_a_direct_run_that_cannot_show_what_is_declared_is_refused(scenario, cha
         qb.simulate(scenario.with_overrides(changes))
 
 
+def test_a_tolerance_of_the_method_hides_a_line_as_the_scenario_s_does(scenario):
+    with pytest.raises(qb.ScenarioError, match=r"expected at most .* by order .* got 0\.001"):
+        qb.simulate(scenario, qb.Direct(absolute_tolerance=1e-3))
+
+
 def test_a_line_without_amplitude_needs_no_output_rate(scenario):
     lines = [*ORDERS[:1], {"order": 9}]
     changes = {

@@ -13,7 +13,7 @@ from quietbus.analysis.jitter.lines import SAME_FREQUENCY, combine
 from quietbus.analysis.signals.residual import residual
 from quietbus.analysis.signals.spectrum import Spectrum, amplitude_spectrum, detrended
 from quietbus.plots.style import COLOURS, DASHES
-from quietbus.results import aliasing, scenario_of
+from quietbus.results import aliasing, method_of, scenario_of
 
 AXES = ("x", "y", "z")
 ANGLES = ("roll", "pitch", "yaw")
@@ -30,7 +30,7 @@ LINES: dict[str, tuple[str, dict[str, Any]]] = {
 
 def is_harmonic(run: xr.Dataset) -> bool:
     """Whether a run holds slow motion and jitter apart, instead of every rotor turn."""
-    return run.attrs.get("method") == "harmonic"
+    return method_of(run).jitter_apart
 
 
 def heading(run: xr.Dataset, what: str) -> str:

@@ -18,7 +18,7 @@ from quietbus.plots.signals import (
 from quietbus.report.harmonic import harmonic_pictures
 from quietbus.report.lines import GREY, Drawing, Panel, Picture, decimate, finished, line_look
 from quietbus.report.signals import jitter_over_time
-from quietbus.results import aliasing, has_gimbals, scenario_of
+from quietbus.results import aliasing, has_gimbals, method_of, scenario_of
 
 BUCKETS = 2000  # stretches that a long line is cut into, each drawn by two points
 POINTS = 160_000  # over time on a page, about 3.5 MB
@@ -40,7 +40,7 @@ def pictures(run: xr.Dataset) -> tuple[list[Picture], int | None]:
 
 def is_harmonic(run: xr.Dataset) -> bool:
     """Whether a run holds the slow motion and the jitter's amplitudes apart."""
-    return run.attrs.get("method") == "harmonic"
+    return method_of(run).jitter_apart
 
 
 def _parts(run: xr.Dataset) -> Iterator[Drawing | Picture]:

@@ -17,7 +17,7 @@ from quietbus.scenario import Scenario
 from quietbus.scenario.wheels import WheelCluster
 from quietbus.words import shown
 
-MOST_LETTERS = 8_000_000  # of the texts whose scenarios are kept, a thousand ordinary ones
+MOST_LETTERS = 2_000_000  # of the texts whose scenarios are kept: of 800 ordinary ones, some 16 MB
 
 _kept: OrderedDict[str, Scenario] = OrderedDict()  # by text, the one used last at the end
 _lock = threading.Lock()
@@ -51,7 +51,7 @@ def _keep(text: str, scenario: Scenario) -> None:
     with _lock:
         _kept[text] = scenario
         _kept.move_to_end(text)
-        while sum(map(len, _kept)) > MOST_LETTERS:
+        while len(_kept) > 1 and sum(map(len, _kept)) > MOST_LETTERS:
             _kept.popitem(last=False)
 
 
@@ -75,8 +75,15 @@ def scenario_of(run: xr.Dataset) -> Scenario:
 
 
 def method_of(run: xr.Dataset) -> type[Method]:
-    """By which kind of method a run was made."""
-    return METHODS[run.attrs["method"]]
+    """By which kind of method a run was made.
+
+    Raises:
+        ValueError: by none that is known.
+    """
+    word = str(run.attrs.get("method"))
+    if word not in METHODS:
+        raise ValueError(f"run: expected the method {' or '.join(METHODS)}, got {shown(word)}")
+    return METHODS[word]
 
 
 def has_gimbals(run: xr.Dataset) -> bool:
