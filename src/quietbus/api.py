@@ -32,7 +32,8 @@ from quietbus.studies.jitter import JitterStudy
 from quietbus.studies.jitter import worst_over_phases as worst_phases_at_rest
 from quietbus.studies.linear import Study
 from quietbus.studies.platforms import PlatformStudy
-from quietbus.studies.verification import Verification, check_requirements
+from quietbus.studies.requirements import check_requirements
+from quietbus.studies.verification import Verification
 
 
 def simulate(

@@ -1,4 +1,4 @@
-"""Values as JSON has them."""
+"""Numbers for readers: angles in arcseconds, values as JSON has them."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import math
 from typing import Any
 
 import numpy as np
+
+ARCSEC = 3600.0 * math.degrees(1.0)  # in a radian
 
 
 def json_ready(value: Any) -> Any:

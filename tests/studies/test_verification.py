@@ -12,8 +12,9 @@ import xarray as xr
 
 import quietbus as qb
 from quietbus import cli
+from quietbus.plain import ARCSEC
 from quietbus.plots import pointing_figures
-from quietbus.studies.verification import ARCSEC, _errors, image_motion, rotors_of
+from quietbus.studies.image_motion import body_errors, image_motion, rotors_of
 
 STILL = {"initial": {"attitude": [0, 0, 0], "steady": True}, "simulation.duration": 0.5}
 # every motion that there is moves this image, each by about as much
@@ -72,7 +73,7 @@ def test_a_displacement_of_the_whole_satellite_is_one_of_the_bus_alone(both):
     run = both["direct"].run
     shift = np.array([0.1, -0.2, 0.3])
     moved = run.assign({name: run[name] + shift for name in ("bus_position", "platform_position")})
-    change = _errors(moved, both["direct"].scenario) - _errors(run, both["direct"].scenario)
+    change = body_errors(moved, both["direct"].scenario) - body_errors(run, both["direct"].scenario)
     expected = np.concatenate([np.zeros(3), shift, np.zeros(6)])
     assert change == pytest.approx(np.broadcast_to(expected, change.shape), abs=1e-6)
 

@@ -8,8 +8,9 @@ import quietbus as qb
 from quietbus.analysis.pointing.metrics import evaluate
 from quietbus.analysis.pointing.motion import ImageMotion, SampledSignal
 from quietbus.analysis.pointing.noise import Noise
+from quietbus.plain import ARCSEC
 from quietbus.plots.pointing import cumulative_spectrum, powers
-from quietbus.studies.verification import ARCSEC, image_motion
+from quietbus.studies.image_motion import image_motion
 
 NOISE = {
     "orders": [{"order": 1, "radial_force": "2e-6 kg*m"}],
@@ -125,13 +126,13 @@ def test_a_verdict_hangs_on_the_noise(both):
     motion = image_motion(run, "camera")
     limit = 0.999 * both["harmonic"].verdicts[0].value
     tight = scenario([{**GIVEN, **ALL[0], "start": START, "end": END, "at_most": limit}])
-    again = qb.verification.Verification(run.assign_attrs(scenario=tight.to_yaml()))
+    again = qb.Verification(run.assign_attrs(scenario=tight.to_yaml()))
     assert not again.met
     assert again.verdicts[0].margin < 0.0
     silent = run.drop_vars([name for name in run.variables if name.startswith("line_of_sight_psd")])
     assert image_motion(silent, "camera").noise is None
     assert motion.noise is not None
-    assert qb.verification.Verification(silent.assign_attrs(scenario=tight.to_yaml())).met
+    assert qb.Verification(silent.assign_attrs(scenario=tight.to_yaml())).met
 
 
 @pytest.mark.parametrize(
@@ -183,9 +184,7 @@ def test_no_statistic_of_jitter_is_next_to_nothing_beside_red_noise(both, monkey
     power lies below what a window sees."""
     asked = scenario(RED["requirements"])
     monkeypatch.setattr("quietbus.studies.verification.image_motion", lambda *_: red_noise(both))
-    verification = qb.verification.Verification(
-        both["harmonic"].run.assign_attrs(scenario=asked.to_yaml())
-    )
+    verification = qb.Verification(both["harmonic"].run.assign_attrs(scenario=asked.to_yaml()))
     rms = {
         v.metric.window: v.value for v in verification.verdicts if v.statistic.confidence is None
     }

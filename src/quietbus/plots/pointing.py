@@ -10,9 +10,9 @@ from matplotlib.ticker import FuncFormatter
 
 from quietbus.analysis.pointing.power import Density, LinePower, cumulative
 from quietbus.analysis.signals.spectrum import detrended
+from quietbus.plain import ARCSEC
 from quietbus.plots.jitter import log_scale
 from quietbus.plots.style import COLOURS, DASHES, explain, literal, new_figure, share_legend, style
-from quietbus.studies.verification import ARCSEC
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
     from quietbus.analysis.pointing.motion import ImageMotion
     from quietbus.analysis.pointing.power import Power
-    from quietbus.studies.verification import Verdict, Verification
+    from quietbus.studies.verdict import Verdict
+    from quietbus.studies.verification import Verification
 
 MOST_NAMED = 8  # contributors in a picture; the others are one
 LEAST_SHARE = 1e-3  # of the RMS of all lines, that a line has to have to be named

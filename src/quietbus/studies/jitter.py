@@ -37,14 +37,13 @@ from quietbus.arguments import count as whole
 from quietbus.build import build_satellite
 from quietbus.dynamics.vibration import NOTHING_SEEN, Vibration
 from quietbus.model.satellite import Satellite
-from quietbus.plain import json_ready
+from quietbus.plain import ARCSEC, json_ready
 from quietbus.scenario import Scenario, ScenarioError
 from quietbus.solve.harmonic import ResonanceError, refuse_resonance
 from quietbus.solve.noise import Broadband, noise_spectra
 
 MOUNTS = ("isolated", "rigid")
 SWEPT = 1.2  # times the rotors' own speed: where a sweep ends unless told otherwise
-ARCSEC = np.rad2deg(1.0) * 3600.0
 # differences of the scenario's algebra: offsets in steps and weights
 _CENTRAL: tuple[tuple[int, ...], np.ndarray] = (
     (-3, -2, -1, 1, 2, 3),
