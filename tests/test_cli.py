@@ -11,7 +11,7 @@ import pytest
 
 import quietbus as qb
 from quietbus import cli
-from quietbus.tables import critical_table
+from quietbus.tables.jitter import critical_table
 from quietbus.writing import OutputError
 
 

@@ -10,7 +10,7 @@ import quietbus as qb
 from quietbus import cli
 from quietbus.analysis.jitter.lines import KINDS, combine
 from quietbus.studies.jitter import jitter_of_designs, worst_case_norm
-from quietbus.tables import jitter_tables
+from quietbus.tables.jitter import jitter_tables
 
 
 @pytest.fixture(scope="module")

@@ -96,7 +96,7 @@ def fit(
         print(json.dumps(fitted.to_dict(), indent=2, allow_nan=False))
         return
     from quietbus.plots.waterfall import waterfall_figures
-    from quietbus.tables import fit_tables
+    from quietbus.tables.waterfall import fit_tables
 
     for table in fit_tables(fitted):
         print_table(table)

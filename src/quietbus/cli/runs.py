@@ -77,7 +77,7 @@ def simulate(
     from quietbus.results.checkpoint import CheckpointError
     from quietbus.runs import SimulationError
     from quietbus.solve.harmonic import ResonanceError
-    from quietbus.tables import summary_table
+    from quietbus.tables.runs import summary_table
 
     failed = ""
     with keeping_results():
@@ -150,7 +150,7 @@ def compare(
     from quietbus.plots import compare_figures, run_figures, save_figures
     from quietbus.results import summarize, with_worst_phases
     from quietbus.results.checkpoint import CheckpointError
-    from quietbus.tables import summary_table
+    from quietbus.tables.runs import summary_table
 
     with keeping_results():
         with progress(dict.fromkeys(Mount, checked.simulation.duration)) as tell, notes():

@@ -46,7 +46,7 @@ def validate(
     checked = load(scenario, mount, None)
     if export is not None:
         check_file(export, "MuJoCo model (XML)")
-    from quietbus.tables import checks_table
+    from quietbus.tables.checks import checks_table
 
     try:
         checks = checks_of(checked, export)

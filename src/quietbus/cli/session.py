@@ -146,6 +146,6 @@ def print_table(table: Table) -> None:
 
 def show_as_read(scenario: Scenario) -> None:
     """The main values that a command goes by."""
-    from quietbus.tables import as_read_table
+    from quietbus.tables.runs import as_read_table
 
     print_table(as_read_table(scenario))

@@ -68,7 +68,7 @@ def analyze(
 
 def _print_analysis(study: Study, output: Path) -> None:
     from quietbus.plots import analysis_figures
-    from quietbus.tables import analysis_tables
+    from quietbus.tables.linear import analysis_tables
 
     show_as_read(study.scenario)
     for part in analysis_tables(study):
@@ -105,7 +105,7 @@ def jitter(
     if as_json:
         print(json.dumps(numbers, indent=2, allow_nan=False))
         return
-    from quietbus.tables import jitter_tables
+    from quietbus.tables.jitter import jitter_tables
 
     show_as_read(checked)
     for table in jitter_tables(numbers):
@@ -167,7 +167,7 @@ def verify(
         print(json.dumps(numbers, indent=2, allow_nan=False))
     else:
         from quietbus.plots import pointing_figures
-        from quietbus.tables import verification_tables
+        from quietbus.tables.verification import verification_tables
 
         show_as_read(checked)
         for part in verification_tables(numbers):

@@ -25,7 +25,8 @@ except ModuleNotFoundError as missing:
         "quietbus report needs the extra: pip install 'quietbus[report]'"
     ) from missing
 from quietbus.results import aliasing, has_gimbals, scenario_of, summarize
-from quietbus.tables import checks_table, summary_table
+from quietbus.tables.checks import checks_table
+from quietbus.tables.runs import summary_table
 from quietbus.words import visible_lines
 from quietbus.writing import check_target, write_text
 
