@@ -11,7 +11,12 @@ from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File
 
 ROOT = Path(__file__).parents[1]
-FROM_ROOT = {"README.md": "index.md", "CHANGELOG.md": "changelog.md", "LICENSE": "license.txt"}
+FROM_ROOT = {
+    "README.md": "index.md",
+    "CHANGELOG.md": "changelog.md",
+    "CONTRIBUTING.md": "contributing.md",
+    "LICENSE": "license.txt",
+}
 _LINK = re.compile(r"(?<=\]\()[^)\s]+(?=\))")
 _MATHS = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
 _CODE = re.compile(r"<code.*?</code>", re.DOTALL)

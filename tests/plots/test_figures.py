@@ -10,7 +10,6 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from quietbus.plots import compare_figures, run_figures, save_figures
-from quietbus.plots.signals import euler_angles, jitter, rate_spectrum, rotor_frequencies
 from quietbus.plots.style import (
     draw_line,
     envelope,
@@ -21,6 +20,7 @@ from quietbus.plots.style import (
     style,
 )
 from quietbus.results import VARIABLES
+from quietbus.results.motion import euler_angles, jitter, rate_spectrum, rotor_frequencies
 from quietbus.scenario import load_scenario
 
 SLOW, ROTOR = 1e-3, 100.0  # [rad/s], [Hz]

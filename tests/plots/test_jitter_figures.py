@@ -19,8 +19,8 @@ from quietbus.plots import (
     run_figures,
     save_figures,
 )
-from quietbus.plots.signals import RotorLines, last_lines
 from quietbus.results import VARIABLES
+from quietbus.results.motion import RotorLines, last_lines
 from quietbus.scenario import load_scenario
 from quietbus.studies.jitter import jitter_of_designs
 
@@ -341,6 +341,7 @@ def test_a_kind_at_a_second_order_has_its_own_hatched_bar():
         budget=same,
         kinds=KINDS[:4],
         orders=ORDERS,
+        imbalance_orders=ORDERS,
         gimbal_angle=np.zeros(2),
         bus_rate=lambda _: budget.sum(axis=0),
         combined=lambda _: SimpleNamespace(worst_case=np.full(3, 8e-6)),

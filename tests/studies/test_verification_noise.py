@@ -5,11 +5,12 @@ import pytest
 from scipy.signal import butter, sosfiltfilt
 
 import quietbus as qb
+from quietbus.analysis.pointing.contributors import powers
 from quietbus.analysis.pointing.metrics import evaluate
 from quietbus.analysis.pointing.motion import ImageMotion, SampledSignal
 from quietbus.analysis.pointing.noise import Noise
 from quietbus.plain import ARCSEC
-from quietbus.plots.pointing import cumulative_spectrum, powers
+from quietbus.plots.pointing import cumulative_spectrum
 from quietbus.studies.image_motion import image_motion
 
 NOISE = {

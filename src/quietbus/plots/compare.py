@@ -9,20 +9,7 @@ from matplotlib.figure import Figure
 
 from quietbus.plots.jitter import draw_lines_by_order, log_scale
 from quietbus.plots.run import TIME, finish_spectrum, struts, unit_figures
-from quietbus.plots.signals import (
-    ANGLES,
-    AXES,
-    LINES,
-    NOISE,
-    Jitter,
-    cut_short,
-    degrees,
-    euler_angles,
-    is_harmonic,
-    jitter,
-    last_lines,
-    rate_spectrum,
-)
+from quietbus.plots.signals import ANGLES, AXES, LINES, cut_short
 from quietbus.plots.style import (
     draw_line,
     explain,
@@ -33,6 +20,16 @@ from quietbus.plots.style import (
     style,
 )
 from quietbus.results import scenario_of, summarize
+from quietbus.results.motion import (
+    NOISE,
+    Jitter,
+    degrees,
+    euler_angles,
+    is_harmonic,
+    jitter,
+    last_lines,
+    rate_spectrum,
+)
 
 
 def compare_figures(runs: Mapping[str, xr.Dataset]) -> dict[str, Figure]:

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from quietbus.model.cmg import ORDERS
-from quietbus.plots.signals import AXES, LINES, NOISE, RotorLines
+from quietbus.plots.signals import AXES, LINES
 from quietbus.plots.style import COLOURS, explain, new_figure, scaled, share_legend, style
-from quietbus.studies.jitter import jitter_of_designs, worst_case_norm
+from quietbus.results.motion import NOISE, RotorLines
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -244,7 +243,7 @@ def _budget_parts(study: JitterStudy) -> list[_Part]:
         if name == "order tables":
             parts.append(_Part(kind, name, "all orders", list(range(len(study.orders))), ""))
             continue
-        for order, hatch in zip(ORDERS, HATCHES, strict=True):
+        for order, hatch in zip(study.imbalance_orders, HATCHES, strict=True):
             parts.append(_Part(kind, name, f"{order}Ω", [study.orders.index(order)], hatch))
     return parts
 
@@ -275,8 +274,8 @@ def worst(study: JitterStudy) -> Figure:
     panels = figure.subplots(1, 2)
     for axes, (mount, (label, look)) in zip(panels, LINES.items(), strict=True):
         angles = found[mount].gimbal_angle
-        there = jitter_of_designs([study.satellite(mount)], angles)["bus_rate"][0]
-        both = np.rad2deg([_sums(study.bus_rate(mount)), _sums(there)])  # (angles, axes and norm)
+        here, there = study.worst_phases(mount), study.worst_phases(mount, angles)
+        both = np.rad2deg([np.append(sums, np.linalg.norm(sums)) for sums in (here, there)])
         factor, unit = scaled(float(both.max()), "deg/s")
         bars = ((-0.2, "white", "at the scenario's angles"), (0.2, look["color"], "at the worst"))
         for values, (offset, colour, when) in zip(factor * both, bars, strict=True):
@@ -293,8 +292,3 @@ def worst(study: JitterStudy) -> Figure:
         axes.grid(visible=False, axis="x")
         axes.legend(loc="upper left")
     return figure
-
-
-def _sums(amplitude: np.ndarray) -> np.ndarray:
-    """Sums of all amplitudes (cmg, order, axis) for each axis, and their norm."""
-    return np.append(np.abs(amplitude).sum(axis=(0, 1)), worst_case_norm(amplitude[None]))

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.ticker import FuncFormatter
 
-from quietbus.analysis.pointing.power import Density, LinePower, cumulative
-from quietbus.analysis.signals.spectrum import detrended
+from quietbus.analysis.pointing.contributors import powers
+from quietbus.analysis.pointing.power import cumulative
 from quietbus.plain import ARCSEC
 from quietbus.plots.jitter import log_scale
 from quietbus.plots.style import COLOURS, DASHES, explain, literal, new_figure, share_legend, style
@@ -20,13 +20,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from quietbus.analysis.pointing.motion import ImageMotion
     from quietbus.analysis.pointing.power import Power
     from quietbus.studies.verdict import Verdict
     from quietbus.studies.verification import Verification
-
-MOST_NAMED = 8  # contributors in a picture; the others are one
-LEAST_SHARE = 1e-3  # of the RMS of all lines, that a line has to have to be named
 
 
 def pointing_figures(verification: Verification) -> dict[str, Figure]:
@@ -47,45 +43,6 @@ def _stretch(verification: Verification, name: str) -> tuple[float, float]:
     """The longest stretch over which a line of sight is judged."""
     own = [v.stretch for v in verification.verdicts if v.line_of_sight == name]
     return max(own, key=lambda stretch: stretch[1] - stretch[0])
-
-
-def powers(motion: ImageMotion, stretch: tuple[float, float]) -> dict[str, Power]:
-    """Mean square [rad^2] of an image motion by frequency: signal, each rotor's lines and noise.
-
-    The signal's density is a periodogram with a Hann window, its cubic trend taken off.
-    """
-    signal, (start, end) = motion.signal, stretch
-    here = (signal.time >= start - 1e-9) & (signal.time <= end + 1e-9)
-    parts: dict[str, Power] = {}
-    if np.count_nonzero(here) >= 16:
-        y = detrended(signal.time[here], signal.values[here])
-        w = np.hanning(len(y) + 1)[:-1, None]
-        f = np.fft.rfftfreq(len(y), 1.0 / signal.rate)
-        density = 2.0 * np.sum(np.abs(np.fft.rfft(w * y, axis=0)) ** 2, axis=1)
-        density /= signal.rate * np.sum(w**2)
-        name = "motion" if motion.lines is None else "slow motion, less its cubic trend"
-        parts[name] = Density(f, density)
-    if motion.lines is None:
-        return parts
-    lines = motion.lines
-    mean = np.mean(np.sum(0.5 * np.abs(lines.amplitude[here]) ** 2, axis=2), axis=0)
-    f = np.abs(lines.frequency) / (2.0 * np.pi)
-    least = LEAST_SHARE**2 * np.sum(mean)
-    named = [i for i in np.argsort(-mean)[:MOST_NAMED] if mean[i] > least]
-    for i in sorted(named):
-        parts[f"{lines.names[i]}, {f[i]:.5g} Hz"] = LinePower(f[[i]], mean[[i]])
-    others = np.setdiff1d(np.flatnonzero(mean > 0.0), named)
-    if len(others) and np.sum(mean[others]) > least:
-        parts["other lines"] = LinePower(f[others], mean[others])
-    noise = motion.noise
-    if noise is not None:
-        instants = signal.time[here] if np.any(here) else np.array([0.5 * (start + end)])
-        trace = np.trace(noise.density, axis1=3, axis2=4)
-        mean = np.mean(noise.at(instants, trace), axis=0)
-        for name, density in zip(noise.names, mean.T, strict=True):
-            if np.any(density > 0.0):
-                parts[name] = Density(noise.frequency, density)
-    return parts
 
 
 def cumulative_spectrum(title: str, parts: Mapping[str, Power]) -> Figure:

@@ -9,19 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from quietbus.plots.jitter import NO_JITTER, draw_lines_by_order, log_scale
-from quietbus.plots.signals import (
-    ANGLES,
-    AXES,
-    NOISE,
-    degrees,
-    euler_angles,
-    heading,
-    is_harmonic,
-    jitter,
-    last_lines,
-    rate_spectrum,
-    rotor_frequencies,
-)
+from quietbus.plots.signals import ANGLES, AXES, heading
 from quietbus.plots.style import (
     COLOURS,
     DASHES,
@@ -35,8 +23,18 @@ from quietbus.plots.style import (
     style,
 )
 from quietbus.results import aliasing, has_gimbals, scenario_of
+from quietbus.results.motion import (
+    LIMIT_OF_CHANGE,
+    NOISE,
+    degrees,
+    euler_angles,
+    is_harmonic,
+    jitter,
+    last_lines,
+    rate_spectrum,
+    rotor_frequencies,
+)
 from quietbus.scenario.wheels import WheelCluster
-from quietbus.solve.harmonic import SLOW_CHANGE
 
 TIME = "time [s]"
 RPM = 30.0 / np.pi  # of a rad/s
@@ -148,7 +146,7 @@ def rates_and_envelope(run: xr.Dataset) -> Figure:
 def _change_error(axes: Axes, run: xr.Dataset) -> None:
     """Estimated error of a harmonic run's jitter, and what is too much."""
     time, error = run["time"].to_numpy(), 100.0 * run["jitter_change_error"].to_numpy()
-    limit, worst = 100.0 * SLOW_CHANGE, int(np.argmax(error))
+    limit, worst = 100.0 * LIMIT_OF_CHANGE, int(np.argmax(error))
     draw_line(axes, time, error, color="black")
     axes.axhline(limit, color=COLOURS[1], linewidth=0.9)
     axes.annotate(

@@ -10,8 +10,9 @@ from matplotlib.colors import LogNorm
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from quietbus.analysis.jitter.run_up import TURNS
-from quietbus.plots.signals import AXES, LINES, NOISE
+from quietbus.plots.signals import AXES, LINES
 from quietbus.plots.style import COLOURS, DASHES, explain, new_figure, scaled, share_legend, style
+from quietbus.results.motion import NOISE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

@@ -6,19 +6,12 @@ import numpy as np
 import plotly.graph_objects as go
 import xarray as xr
 
-from quietbus.plots.signals import (
-    ANGLES,
-    AXES,
-    degrees,
-    euler_angles,
-    jitter,
-    rate_spectrum,
-    rotor_frequencies,
-)
+from quietbus.plots.signals import ANGLES, AXES
 from quietbus.report.harmonic import harmonic_pictures
 from quietbus.report.lines import GREY, Drawing, Panel, Picture, decimate, finished, line_look
-from quietbus.report.signals import jitter_over_time
 from quietbus.results import aliasing, has_gimbals, method_of, scenario_of
+from quietbus.results.envelope import jitter_over_time
+from quietbus.results.motion import degrees, euler_angles, jitter, rate_spectrum, rotor_frequencies
 
 BUCKETS = 2000  # stretches that a long line is cut into, each drawn by two points
 POINTS = 160_000  # over time on a page, about 3.5 MB

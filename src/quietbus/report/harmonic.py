@@ -6,9 +6,10 @@ import numpy as np
 import xarray as xr
 from plotly.subplots import make_subplots
 
-from quietbus.plots.signals import AXES, degrees, last_lines
+from quietbus.plots.signals import AXES
 from quietbus.plots.style import COLOURS
 from quietbus.report.lines import Drawing, Panel, Picture, finished
+from quietbus.results.motion import degrees, last_lines
 
 # variable of a harmonic run: what its line is called
 COMBINED = {

@@ -36,6 +36,7 @@ from quietbus.arguments import choice, listing, positive
 from quietbus.arguments import count as whole
 from quietbus.build import build_satellite
 from quietbus.dynamics.vibration import NOTHING_SEEN, Vibration
+from quietbus.model.cmg import ORDERS
 from quietbus.model.satellite import Satellite
 from quietbus.plain import ARCSEC, json_ready
 from quietbus.scenario import Scenario, ScenarioError
@@ -125,6 +126,17 @@ class JitterStudy:
         """Amplitudes (cmg, order, axis) [rad/s]."""
         return self.outputs[choice("mount", mount, MOUNTS)]["bus_rate"]
 
+    def worst_phases(self, mount: str, gimbal_angle: np.ndarray | None = None) -> np.ndarray:
+        """(axis,) bus rate [rad/s] with the worst rotor phases: the sum of all amplitudes.
+
+        Args:
+            gimbal_angle: (cmg,) [rad] instead of the study's own.
+        """
+        amplitude = self.bus_rate(mount)
+        if gimbal_angle is not None:
+            amplitude = jitter_of_designs([self.satellite(mount)], gimbal_angle)["bus_rate"][0]
+        return np.sum(np.abs(amplitude), axis=(0, 1))
+
     def combined(self, mount: str, output: str = "bus_rate") -> Combined:
         """All rotors and orders together, in the output's unit."""
         outputs = self.outputs[choice("mount", mount, MOUNTS)]
@@ -152,6 +164,11 @@ class JitterStudy:
                 spectra = noise_spectra(satellite, small, modes, NOTHING_SEEN)
                 found[mount] = Broadband(np.zeros(1, int), *spectra)
         return found
+
+    @property
+    def imbalance_orders(self) -> tuple[int, ...]:
+        """Multiples of rotor speed that imbalance causes."""
+        return ORDERS
 
     @property
     def kinds(self) -> tuple[str, ...]:

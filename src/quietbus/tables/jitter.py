@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 
-from quietbus.tables.parts import AXES, NOISE, number, titled
+from quietbus.results.motion import NOISE
+from quietbus.tables.parts import AXES, number, titled
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 AXES = ("x", "y", "z")
-NOISE = 1e-10  # [deg/s] jitter that is the integrator's; a ratio to it says nothing
 
 
 def titled(title: str) -> Table:

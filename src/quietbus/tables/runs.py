@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 from rich.table import Table
 from rich.text import Text
 
+from quietbus.results.motion import NOISE
 from quietbus.scenario.as_read import as_read
-from quietbus.tables.parts import AXES, NOISE, titled
+from quietbus.tables.parts import AXES, titled
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

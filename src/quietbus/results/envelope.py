@@ -6,8 +6,8 @@ from scipy.ndimage import maximum_filter1d
 from scipy.signal import oaconvolve, resample_poly
 
 from quietbus.analysis.signals.residual import FINER
-from quietbus.plots.signals import TREND, degrees, rotor_frequencies
 from quietbus.results import aliasing, scenario_of
+from quietbus.results.motion import TREND, degrees, rotor_frequencies
 
 TURNS = 10  # of the slowest rotor, that the envelope looks at
 _EDGE = 10  # samples at both ends that the interpolation between samples gets wrong

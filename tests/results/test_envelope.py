@@ -5,8 +5,8 @@ import pytest
 import xarray as xr
 
 from quietbus.analysis.signals.spectrum import detrended
-from quietbus.report.signals import jitter_over_time
 from quietbus.results import summarize
+from quietbus.results.envelope import jitter_over_time
 from quietbus.scenario import load_scenario
 
 ROTOR = 100.0  # [Hz] of zhang2012
