@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from quietbus.analysis.pointing.metrics import Statistic
 from quietbus.analysis.pointing.motion import ImageMotion
+from quietbus.analysis.pointing.statistic import Statistic
 from quietbus.analysis.pointing.windows import Metric
 from quietbus.plain import ARCSEC
 
@@ -83,8 +83,7 @@ def _time(seconds: float) -> str:
 
 def meaning(metric: Metric, statistic: Statistic, motion: ImageMotion) -> str:
     """What the value is, in words."""
-    given = motion.lines is None or statistic.phases == "given"
-    noisy = motion.noise is not None
+    given = not motion.apart or statistic.phases == "given"
     phases = "rotor phases as given" if given else "any rotor phases"
     if statistic.confidence is None:
         mean = "mean" if metric.name == "MTF_loss" else "RMS"
@@ -94,11 +93,11 @@ def meaning(metric: Metric, statistic: Statistic, motion: ImageMotion) -> str:
         case "temporal", False:
             return f"{level} of the time for the worst rotor phases (temporal)"
         case "ensemble", False:
-            noise = " and noise" if noisy else ""
+            noise = " and noise" if motion.noisy else ""
             return f"always, for {level} of all rotor phases{noise} (ensemble)"
         case "mixed", False:
             return f"{level} of all times and rotor phases (mixed)"
-        case "ensemble", True if noisy:
+        case "ensemble", True if motion.noisy:
             return f"always, for {level} of all noise, {phases} (ensemble)"
         case "ensemble", True:
             return f"always, {phases} (ensemble of one member)"

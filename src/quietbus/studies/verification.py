@@ -10,8 +10,9 @@ import numpy as np
 import xarray as xr
 
 from quietbus.analysis.pointing.chi_square import UnsoundStatisticError
-from quietbus.analysis.pointing.metrics import Statistic, contributions, evaluate
+from quietbus.analysis.pointing.metrics import contributions, evaluate
 from quietbus.analysis.pointing.motion import ImageMotion
+from quietbus.analysis.pointing.statistic import Statistic
 from quietbus.analysis.pointing.windows import Metric, largest_change
 from quietbus.arguments import choice, count
 from quietbus.plain import ARCSEC, json_ready

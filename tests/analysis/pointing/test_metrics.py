@@ -4,20 +4,16 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, norm
 
+from quietbus.analysis.pointing.gaussian import gaussian_radius
 from quietbus.analysis.pointing.image_quality import (
     mtf_gaussian_jitter,
     mtf_of_motion,
     mtf_sine_jitter,
     mtf_smear,
 )
-from quietbus.analysis.pointing.metrics import (
-    INTERPRETATIONS,
-    Statistic,
-    contributions,
-    evaluate,
-    gaussian_radius,
-)
+from quietbus.analysis.pointing.metrics import contributions, evaluate
 from quietbus.analysis.pointing.motion import ImageMotion, Lines, SampledSignal
+from quietbus.analysis.pointing.statistic import INTERPRETATIONS, Statistic
 from quietbus.analysis.pointing.windows import (
     LINEAR,
     METRICS,

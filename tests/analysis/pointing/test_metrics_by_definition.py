@@ -10,9 +10,10 @@ import pytest
 
 from oracles.pointing_members import draw, jitter, loss, nodes
 from quietbus.analysis.pointing.chi_square import MeanSquare, UnsoundStatisticError, quantile
-from quietbus.analysis.pointing.metrics import Statistic, evaluate
+from quietbus.analysis.pointing.metrics import evaluate
 from quietbus.analysis.pointing.motion import ImageMotion, Lines, SampledSignal
 from quietbus.analysis.pointing.noise import Noise
+from quietbus.analysis.pointing.statistic import Statistic
 from quietbus.analysis.pointing.window_noise import WindowNoise
 from quietbus.analysis.pointing.windows import Metric
 

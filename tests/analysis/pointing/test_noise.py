@@ -6,15 +6,11 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.stats import norm
 
-from quietbus.analysis.pointing.metrics import (
-    INTERPRETATIONS,
-    Statistic,
-    contributions,
-    evaluate,
-    gaussian_radius,
-)
+from quietbus.analysis.pointing.gaussian import gaussian_radius
+from quietbus.analysis.pointing.metrics import contributions, evaluate
 from quietbus.analysis.pointing.motion import ImageMotion, Lines, SampledSignal
 from quietbus.analysis.pointing.noise import Noise
+from quietbus.analysis.pointing.statistic import INTERPRETATIONS, Statistic
 from quietbus.analysis.pointing.windows import Metric, gain, weight
 
 RMS = Statistic()

@@ -32,11 +32,9 @@ def powers(motion: ImageMotion, stretch: tuple[float, float]) -> dict[str, Power
         f = np.fft.rfftfreq(len(y), 1.0 / signal.rate)
         density = 2.0 * np.sum(np.abs(np.fft.rfft(w * y, axis=0)) ** 2, axis=1)
         density /= signal.rate * np.sum(w**2)
-        name = "motion" if motion.lines is None else "slow motion, less its cubic trend"
+        name = "slow motion, less its cubic trend" if motion.apart else "motion"
         parts[name] = Density(f, density)
-    if motion.lines is None:
-        return parts
-    lines = motion.lines
+    lines, noise = motion.known_lines, motion.known_noise
     mean = np.mean(np.sum(0.5 * np.abs(lines.amplitude[here]) ** 2, axis=2), axis=0)
     f = np.abs(lines.frequency) / (2.0 * np.pi)
     least = LEAST_SHARE**2 * np.sum(mean)
@@ -46,12 +44,10 @@ def powers(motion: ImageMotion, stretch: tuple[float, float]) -> dict[str, Power
     others = np.setdiff1d(np.flatnonzero(mean > 0.0), named)
     if len(others) and np.sum(mean[others]) > least:
         parts["other lines"] = LinePower(f[others], mean[others])
-    noise = motion.noise
-    if noise is not None:
-        instants = signal.time[here] if np.any(here) else np.array([0.5 * (start + end)])
-        trace = np.trace(noise.density, axis1=3, axis2=4)
-        mean = np.mean(noise.at(instants, trace), axis=0)
-        for name, density in zip(noise.names, mean.T, strict=True):
-            if np.any(density > 0.0):
-                parts[name] = Density(noise.frequency, density)
+    instants = signal.time[here] if np.any(here) else np.array([0.5 * (start + end)])
+    trace = np.trace(noise.density, axis1=3, axis2=4)
+    mean = np.mean(noise.at(instants, trace), axis=0)
+    for name, density in zip(noise.names, mean.T, strict=True):
+        if np.any(density > 0.0):
+            parts[name] = Density(noise.frequency, density)
     return parts

@@ -65,3 +65,21 @@ class DeviationNoise:
             for moment in (0, 2)
         )
         return largest(probability, value, moving, self.duration)
+
+
+class NoDeviationNoise:
+    """No noise: deviations are as they are."""
+
+    def quantile(
+        self,
+        confidence: float,
+        deviation: np.ndarray,
+        _: np.ndarray | slice,
+        __: int = ANGLES,
+    ) -> float:
+        """Of the length of deviations (n, c)."""
+        return float(np.quantile(np.linalg.norm(deviation, axis=1), confidence))
+
+    def largest(self, probability: np.ndarray) -> np.ndarray:
+        """Zero (q,)."""
+        return np.zeros(len(probability))

@@ -136,6 +136,13 @@ class Lines:
     rotor: np.ndarray  # (line,) number of the rotor
     order: np.ndarray  # (line,)
 
+    @classmethod
+    def none(cls, signal: SampledSignal) -> "Lines":
+        """No lines."""
+        nothing, nobody = np.zeros(0), np.zeros(0, int)
+        amplitude = np.zeros((len(signal.time), 0, signal.values.shape[1]), complex)
+        return cls(amplitude, nothing, nothing, nobody, nothing)
+
     @property
     def names(self) -> tuple[str, ...]:
         """Who makes each line: ``rotor 0, 1Ω``."""
@@ -178,18 +185,38 @@ class ImageMotion:
     lines: Lines | None = None
     noise: Noise | None = None
 
+    @property
+    def apart(self) -> bool:
+        """Whether lines are known apart from the signal, as of a harmonic run."""
+        return self.lines is not None
+
+    @property
+    def noisy(self) -> bool:
+        """Whether there is noise."""
+        return self.noise is not None
+
+    @cached_property
+    def known_lines(self) -> Lines:
+        """Lines known apart from the signal; there may be none."""
+        return self.lines or Lines.none(self.signal)
+
+    @cached_property
+    def known_noise(self) -> Noise:
+        """The noise; it may have no contributors."""
+        return self.noise or Noise.none(self.signal.values.shape[1])
+
     def component(self, i: int) -> "ImageMotion":
         """Component i of the image motion alone."""
         signal = replace(self.signal, values=self.signal.values[:, i : i + 1])
-        lines = self.lines
-        if lines is not None:
-            lines = replace(lines, amplitude=lines.amplitude[..., i : i + 1])
-        return ImageMotion(signal, lines, self.noise and self.noise.component(i))
+        return ImageMotion(
+            signal,
+            self.lines and replace(self.lines, amplitude=self.lines.amplitude[..., i : i + 1]),
+            self.noise and self.noise.component(i),
+        )
 
     def phasors(self, t: np.ndarray) -> np.ndarray:
         """(time, line, c) of the lines at times [s], phases as given."""
-        lines, time = self.lines, self.signal.time
-        assert lines is not None
+        lines, time = self.known_lines, self.signal.time
         right = np.clip(np.searchsorted(time, t), 1, len(time) - 1)
         part = ((t - time[right - 1]) / (time[right] - time[right - 1]))[:, None, None]
         amplitude = (1.0 - part) * lines.amplitude[right - 1] + part * lines.amplitude[right]

@@ -34,6 +34,12 @@ class Noise:
     density: np.ndarray  # (look, f, part, c, c) [rad^2/Hz]
     names: tuple[str, ...]  # (part,)
 
+    @classmethod
+    def none(cls, components: int) -> "Noise":
+        """Noise that nothing contributes to."""
+        density = np.zeros((1, 2, 0, components, components))
+        return cls(np.zeros(1), np.array([0.0, 1.0]), density, ())
+
     def component(self, i: int) -> "Noise":
         """Of one image component alone."""
         return replace(self, density=self.density[..., i : i + 1, i : i + 1])
