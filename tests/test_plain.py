@@ -6,11 +6,15 @@ import math
 import numpy as np
 import pytest
 
-from quietbus.plain import ARCSEC, json_ready
+from quietbus.plain import ARCSEC, RPM, json_ready
 
 
 def test_a_degree_has_3600_arcseconds():
     assert math.radians(1.0) * ARCSEC == pytest.approx(3600.0, rel=1e-15)
+
+
+def test_a_turn_per_second_is_60_rpm():
+    assert 2.0 * math.pi * RPM == pytest.approx(60.0, rel=1e-15)
 
 
 def test_whatever_a_result_holds_json_can_hold():

@@ -1,4 +1,4 @@
-"""Numbers for readers: angles in arcseconds, values as JSON has them."""
+"""Numbers for readers: angles in arcseconds, speeds in rpm, values as JSON has them."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 ARCSEC = 3600.0 * math.degrees(1.0)  # in a radian
+RPM = 30.0 / math.pi  # turns per minute in a radian per second
 
 
 def json_ready(value: Any) -> Any:

@@ -8,7 +8,7 @@ import pytest
 from matplotlib.collections import LineCollection
 
 from quietbus.analysis.jitter.sweep import SpeedSweep, SpinningModes, critical_speeds
-from quietbus.plots.sweep import NO_JITTER, _look_of_order, campbell, sweep_figures
+from quietbus.plots.sweep import NO_JITTER, campbell, look_of_order, sweep_figures
 
 OWN = 2 * np.pi * 50.0
 FACTOR = np.linspace(0.0, 1.2, 121)
@@ -143,7 +143,7 @@ def test_an_infinite_amplitude_does_not_hide_the_rest():
 
 
 def test_no_order_looks_like_another():
-    looks = [tuple(sorted((k, str(v)) for k, v in _look_of_order(i).items())) for i in range(24)]
+    looks = [tuple(sorted((k, str(v)) for k, v in look_of_order(i).items())) for i in range(24)]
     assert len(set(looks)) == len(looks)
 
 

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from quietbus.analysis.signals.waterfall import Waterfall
-from quietbus.plots.waterfall import _name_rays
+from quietbus.plots.waterfall import name_rays
 
 
 @pytest.mark.parametrize(
@@ -19,7 +19,7 @@ def test_names_of_orders_do_not_collide(orders):
     figure = Figure(figsize=(7.5, 4.3))
     axes = figure.subplots(1, 3)[1]
     axes.set(xlim=(0.0, 512.0), ylim=(480.0, 6000.0))
-    _name_rays(axes, measured, orders)
+    name_rays(axes, measured, orders)
     assert [text.get_text() for text in axes.texts] == [f"{order:.3g}" for order in orders]
     boxes = [text.get_window_extent() for text in axes.texts]
     assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))

@@ -120,7 +120,7 @@ def package(tmp_path, monkeypatch):
     for name, content in text.items():
         (tmp_path / name).write_text(content)
     monkeypatch.setattr(sources, "ROOT", tmp_path)
-    sources._imports.cache_clear()
+    sources.imports.cache_clear()
 
 
 def test_a_figure_depends_on_what_its_module_imports_and_on_nothing_else(tmp_path, monkeypatch):
@@ -149,7 +149,7 @@ def test_a_figure_is_made_again_where_its_sources_change(tmp_path, monkeypatch, 
     before = digests()
     with (tmp_path / changed).open("a") as file:
         file.write("# changed\n")
-    sources._imports.cache_clear()
+    sources.imports.cache_clear()
     after = digests()
     assert " ".join(name for name in before if before[name] != after[name]) == again
 
@@ -158,8 +158,8 @@ def test_installing_an_extra_concerns_only_the_figures_that_use_it(tmp_path, mon
     package(tmp_path, monkeypatch)
     one, two = (sources_of(tmp_path / f"{name}.py") for name in ("one", "two"))
     before = one.digest(), two.digest()
-    version = sources._version
-    monkeypatch.setattr(sources, "_version", lambda n: "9" if n == "mujoco" else version(n))
+    version = sources.version_of
+    monkeypatch.setattr(sources, "version_of", lambda n: "9" if n == "mujoco" else version(n))
     assert one.digest() == before[0]
     assert two.digest() != before[1]
 

@@ -162,7 +162,7 @@ def test_jitter_of_a_flight_is_what_rides_on_the_slow_motion():
 
 
 def test_the_papers_own_rates_have_the_papers_ratio():
-    assert flights._printed_ratio() == pytest.approx(1.1e-5 / 3.4e-4)
+    assert flights.printed_ratio() == pytest.approx(1.1e-5 / 3.4e-4)
 
 
 def test_euler_angles_of_the_pictures_are_yaw_pitch_roll():
@@ -175,7 +175,7 @@ def test_euler_angles_of_the_pictures_are_yaw_pitch_roll():
         product = np.append(
             w * turn[0] - v @ turn[1:], w * turn[1:] + turn[0] * v + np.cross(v, turn[1:])
         )
-    assert flights._euler(product[None])[0] == pytest.approx([roll, pitch, yaw])
+    assert flights.euler(product[None])[0] == pytest.approx([roll, pitch, yaw])
 
 
 def test_every_claim_is_told_apart_and_says_where_it_stands_and_why():

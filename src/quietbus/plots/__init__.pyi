@@ -5,6 +5,6 @@ from .geometry import geometry_figures as geometry_figures
 from .jitter import jitter_figures as jitter_figures
 from .pointing import pointing_figures as pointing_figures
 from .run import run_figures as run_figures
+from .run_up import run_up_figure as run_up_figure
 from .style import save_figures as save_figures
-from .sweep import run_up_figure as run_up_figure
 from .sweep import sweep_figures as sweep_figures

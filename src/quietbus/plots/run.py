@@ -8,6 +8,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from quietbus.plain import RPM
 from quietbus.plots.jitter import NO_JITTER, draw_lines_by_order, log_scale
 from quietbus.plots.signals import ANGLES, AXES, heading
 from quietbus.plots.style import (
@@ -37,7 +38,6 @@ from quietbus.results.motion import (
 from quietbus.scenario.wheels import WheelCluster
 
 TIME = "time [s]"
-RPM = 30.0 / np.pi  # of a rad/s
 START = 0.2  # of a run: what settles within it is shown enlarged too
 # of a harmonic run's jitter: (what it is called, its line)
 COMBINED: dict[str, tuple[str, dict[str, Any]]] = {

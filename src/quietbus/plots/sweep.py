@@ -9,21 +9,20 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from quietbus.analysis.jitter.run_up import TURNS
+from quietbus.plain import RPM
 from quietbus.plots.signals import AXES, LINES
 from quietbus.plots.style import COLOURS, DASHES, explain, new_figure, scaled, share_legend, style
 from quietbus.results.motion import NOISE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from quietbus.analysis.jitter.run_up import RunUp
     from quietbus.analysis.jitter.sweep import SpeedSweep
 
-RPM = 30.0 / np.pi
+
 HERTZ = 0.5 / np.pi
 WIDE = 10.0  # times the slowest mode: a frequency axis longer than this is logarithmic
 UNDAMPED = 1e-8  # of critical: a mode damped less has no steady amplitude
@@ -200,7 +199,7 @@ def speeds(sweep: SpeedSweep, name: str) -> Figure:
     excited = np.flatnonzero(np.any([sweep.excited(mount) for mount in LINES], axis=0))
     for i, axes in enumerate(panels):
         for k, o in enumerate(excited):
-            look = _look_of_order(k)
+            look = look_of_order(k)
             axes.plot([], [], **look, label=f"order {sweep.orders[o]:g}")
             for (mount, _), dashes in zip(LINES.items(), MOUNT_DASHES, strict=True):
                 if sweep.excited(mount)[o]:
@@ -230,46 +229,11 @@ def speeds(sweep: SpeedSweep, name: str) -> Figure:
     return figure
 
 
-def _look_of_order(k: int) -> dict[str, Any]:
+def look_of_order(k: int) -> dict[str, Any]:
     """Colour of an order, and from the eighth on marks, so that none looks like another."""
     turn = k // len(COLOURS)
     marked = {"marker": "ov^sDPX"[(turn - 1) % 7], "markevery": 0.08, "markersize": 3.5}
     return {"color": COLOURS[k % len(COLOURS)], "linewidth": 1.1} | (marked if turn else {})
-
-
-def run_up_figure(runs: Mapping[str, RunUp], name: str) -> Figure:
-    """Amplitude of one order through run-ups, against the map of constant speeds.
-
-    Args:
-        runs: by what they are to be called in the legend, of one order.
-        name: of the scenario.
-    """
-    first = next(iter(runs.values()))
-    with style():
-        figure = new_figure(
-            6.0, f"Run-up against the quasi-steady map, order {first.order:g} ({name})"
-        )
-        panels = figure.subplots(len(AXES), 1, sharex=True)
-        factor, unit = scaled(float(np.rad2deg(first.quasi_steady.max())), "deg/s")
-        for i, axes in enumerate(panels):
-            for k, (label, run) in enumerate(runs.items()):
-                look = {"color": COLOURS[k % len(COLOURS)], "linestyle": DASHES[k % len(DASHES)]}
-                axes.plot(
-                    RPM * run.speed, factor * np.rad2deg(run.amplitude[:, i]), **look, label=label
-                )
-            widest = max(runs.values(), key=lambda run: float(np.ptp(run.speed)))
-            axes.plot(
-                RPM * widest.speed,
-                factor * np.rad2deg(widest.quasi_steady[:, i]),
-                color="k",
-                linewidth=0.8,
-                label="map of constant speeds",
-            )
-            axes.set_ylabel(f"about {AXES[i]}\n[{unit}]")
-        panels[0].set_title(f"from the middle of the first {TURNS:g} turns, over which is averaged")
-        panels[-1].set_xlabel("rotor speed [rpm]")
-        share_legend(figure, panels[0])
-    return figure
 
 
 def _finite(sweep: SpeedSweep, mount: str) -> np.ndarray:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.colors import LogNorm, Normalize
 
+from quietbus.plain import RPM
 from quietbus.plots.style import COLOURS, DASHES, MARKERS, new_figure, style
 
 if TYPE_CHECKING:
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from quietbus.analysis.signals.waterfall import ComponentFit, Waterfall
     from quietbus.measured import WaterfallFit
 
-RPM = 30.0 / np.pi
 RESIDUAL = 10.0  # [dB] at the ends of the residual's colours
 DECADES = 7.0  # of power that colours tell apart
 COLUMNS = 256  # of a map
@@ -97,13 +97,13 @@ def _overlay(axes: Axes, fitted: ComponentFit) -> None:
     for line in fitted.orders:
         h = line.order.value
         axes.plot(h * measured.turns, RPM * measured.speed, color="white", lw=0.5, ls=":")
-    _name_rays(axes, measured, sorted(line.order.value for line in strongest))
+    name_rays(axes, measured, sorted(line.order.value for line in strongest))
     for k, whirl in enumerate(fitted.whirl_hz(measured.speed)):
         label = "modes" if k == 0 else None
         axes.plot(whirl, RPM * measured.speed, color=COLOURS[4], lw=1.2, ls=DASHES[1], label=label)
 
 
-def _name_rays(axes: Axes, measured: Waterfall, orders: list[float]) -> None:
+def name_rays(axes: Axes, measured: Waterfall, orders: list[float]) -> None:
     """Names to the right of rays, as high as they find room, on no other ray if that can be."""
     width, height = measured.frequency[-1] - measured.frequency[0], np.ptp(measured.turns)
     first, last = measured.turns[0], measured.turns[-1]

@@ -6,6 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 import xarray as xr
 
+from quietbus.plain import RPM
 from quietbus.plots.signals import ANGLES, AXES
 from quietbus.report.harmonic import harmonic_pictures
 from quietbus.report.lines import GREY, Drawing, Panel, Picture, decimate, finished, line_look
@@ -244,7 +245,7 @@ def _gimbals(run: xr.Dataset) -> Drawing:
 def _rotors(run: xr.Dataset) -> Drawing:
     kind = "CMG" if has_gimbals(run) else "Wheel"
     names = [f"{kind} {number}" for number in range(run.sizes["cmg"])]
-    speed = 30.0 / np.pi * run["rotor_speed"].to_numpy()
+    speed = RPM * run["rotor_speed"].to_numpy()
     return Drawing(
         "rotors",
         "Rotors",

@@ -33,7 +33,7 @@ class Sources:
         for name, path in sorted({**self.modules, **scenarios}.items()):
             digest.update(f"{name}\0".encode() + path.read_bytes())
         for library in sorted(self.libraries):
-            digest.update(f"{library} {_version(library)}\0".encode())
+            digest.update(f"{library} {version_of(library)}\0".encode())
         return digest.hexdigest()
 
 
@@ -47,7 +47,7 @@ def sources_of(file: str | pathlib.Path) -> Sources:
     modules, libraries = {_name(start): start}, set[str]()
     waiting = [start]
     while waiting:
-        for name in _imports(waiting.pop()):
+        for name in imports(waiting.pop()):
             path = _file(name)
             if path is not None and _name(path) not in modules:
                 modules[_name(path)] = path
@@ -59,7 +59,7 @@ def sources_of(file: str | pathlib.Path) -> Sources:
 
 
 @functools.cache
-def _imports(path: pathlib.Path) -> tuple[str, ...]:
+def imports(path: pathlib.Path) -> tuple[str, ...]:
     """Names of the modules that a file imports, and of what it takes from them."""
     return tuple(_imported(ast.parse(path.read_bytes())))
 
@@ -98,7 +98,7 @@ def _name(path: pathlib.Path) -> str:
 
 
 @functools.cache
-def _version(library: str) -> str:
+def version_of(library: str) -> str:
     for distribution in importlib.metadata.packages_distributions().get(library, [library]):
         try:
             return importlib.metadata.version(distribution)

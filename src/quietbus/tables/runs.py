@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from rich.table import Table
 from rich.text import Text
 
+from quietbus.plain import RPM
 from quietbus.results.motion import NOISE
 from quietbus.scenario.as_read import as_read
 from quietbus.tables.parts import AXES, titled
@@ -85,7 +86,7 @@ def _degrees(vector: Sequence[float] | None, i: int) -> float:
 
 
 def _rpm(speeds: np.ndarray | None, i: int) -> float:
-    return math.nan if speeds is None else speeds[i] * 30.0 / math.pi
+    return math.nan if speeds is None else RPM * speeds[i]
 
 
 def _known(value: float | None) -> float:

@@ -26,7 +26,7 @@ def stabilisation(bench: Bench) -> Findings:
     arcsec = 3600.0 * numbers["residual_isolated"]
     numbers["stability_arcsec"] = arcsec  # as the paper seems to have it: the rate, in one second
     numbers["jitter_angle_arcsec"] = arcsec / (2.0 * np.pi * bench.study.rotor_frequencies_hz[-1])
-    numbers |= _imbalance(bench) | {"printed_ratio": 100.0 * _printed_ratio()}
+    numbers |= _imbalance(bench) | {"printed_ratio": 100.0 * printed_ratio()}
     caption = (
         "Figure 9a and b of the paper: left the rates, which all but coincide (the same angle on "
         "each axis), right the jitter about the slow motion, "
@@ -39,7 +39,7 @@ def stabilisation(bench: Bench) -> Findings:
     return Findings(figure, caption, numbers)
 
 
-def _printed_ratio() -> float:
+def printed_ratio() -> float:
     """[-] From the paper's own rates."""
     claims = {claim.name: claim for claim in CLAIMS}
     return claims["residual_isolated"].published / claims["residual_rigid"].published
@@ -75,7 +75,7 @@ def _imbalance(bench: Bench) -> dict[str, float]:
 def slew_angles(bench: Bench) -> Findings:
     """Figure 10."""
     run = bench.flight("zhang2012-slew")["isolated"]
-    time, angles = run["time"].to_numpy(), np.degrees(_euler(run["bus_attitude"].to_numpy()))
+    time, angles = run["time"].to_numpy(), np.degrees(euler(run["bus_attitude"].to_numpy()))
     figure = new_figure(3.4, "Attitude with the platform, slew to (60, 30, -60)°")
     axes = figure.subplots()
     draw_lines(axes, time, angles, ("roll", "pitch", "yaw"))
@@ -187,6 +187,6 @@ def _jitter(axes: Axes, seconds: np.ndarray, peaks: np.ndarray, envelope: Envelo
     axes.plot([], [], "-k", linewidth=1.0, label="harmonic solver")
 
 
-def _euler(q: np.ndarray) -> np.ndarray:
+def euler(q: np.ndarray) -> np.ndarray:
     """Roll, pitch, yaw [rad] (n, 3) of the sequence yaw-pitch-roll from quaternions (n, 4)."""
     return Rotation.from_quat(q, scalar_first=True).as_euler("ZYX")[:, ::-1]

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 
 from quietbus import api
 from quietbus.build import build_satellite
+from quietbus.plain import RPM
 from quietbus.plots.style import COLOURS, DASHES, new_figure, share_legend, span_text
 from quietbus.reproduce.parts import Findings
 from quietbus.reproduce.zhang2012.bench import Bench, jitter_peak
@@ -15,7 +16,6 @@ from quietbus.scenario import Scenario
 AXES = ("x", "y", "z")
 PUBLISHED = 3.0  # [%]
 DRAWS = 2000  # of rotor phases
-RPM = 30.0 / np.pi  # [rpm] of 1 rad/s
 TRANSVERSE = 0.6  # [-] of the spin inertia, as the scenario assumes
 Sweep = tuple[str, str, np.ndarray, float, Callable[[Scenario, float], Scenario]]
 TICKS = {"speed": (2000, 4000, 6000, 10000), "momentum": (5, 10, 20, 40)}

@@ -36,6 +36,7 @@ from quietbus.analysis.signals.waterfall.result import (
     FittedOrder,
 )
 from quietbus.analysis.signals.waterfall.window import SeenWindow, seen_window
+from quietbus.plain import RPM
 
 LEAST_SPEEDS = 8
 LARGEST_DEVIATION = 0.5  # of a coefficient over itself: beyond it is in doubt
@@ -275,7 +276,7 @@ def _notes(
         )
     poor = said.by_speed < _LEAST_EXPLAINED
     if np.any(poor):
-        which = measured.speed[poor] * 30.0 / np.pi
+        which = RPM * measured.speed[poor]
         notes.append(
             f"at {np.sum(poor)} speeds, from {which[0]:.4g} to {which[-1]:.4g} rpm, less than "
             f"{100.0 * _LEAST_EXPLAINED:g} % of the power is explained"
