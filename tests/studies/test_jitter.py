@@ -8,7 +8,8 @@ import pytest
 
 import quietbus as qb
 from quietbus import cli
-from quietbus.analysis.jitter.lines import KINDS, combine
+from quietbus.analysis.jitter.combine import combine
+from quietbus.analysis.jitter.lines import KINDS
 from quietbus.studies.jitter import jitter_of_designs, worst_case_norm
 from quietbus.tables.jitter import jitter_tables
 

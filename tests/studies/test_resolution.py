@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import quietbus as qb
-from quietbus.analysis.jitter.lines import combine
+from quietbus.analysis.jitter.combine import combine
 from quietbus.studies.resolution import refuse_coarse_output, unseen
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from quietbus.analysis.jitter.lines import combine
+from quietbus.analysis.jitter.combine import combine
 from quietbus.dynamics.outputs import Outputs
 from quietbus.results.origin import rotors, text_of
 from quietbus.results.schema import (

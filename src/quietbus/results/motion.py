@@ -8,7 +8,7 @@ import xarray as xr
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
-from quietbus.analysis.jitter.lines import SAME_FREQUENCY, combine
+from quietbus.analysis.jitter.combine import SAME_FREQUENCY, combine
 from quietbus.analysis.signals.residual import residual
 from quietbus.analysis.signals.spectrum import Spectrum, amplitude_spectrum, detrended
 from quietbus.results import aliasing, method_of, scenario_of

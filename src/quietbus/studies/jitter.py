@@ -11,19 +11,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from quietbus.analysis.jitter.combine import Combined, combine
 from quietbus.analysis.jitter.lines import (
     AT_REST,
     KINDS,
     SEARCHED,
-    Combined,
-    WorstAngles,
     budget,
-    combine,
     for_designs,
     imbalance_kinds,
     rest_error,
     steady_jitter,
-    worst_angles,
 )
 from quietbus.analysis.jitter.sweep import (
     SpeedSweep,
@@ -32,6 +29,7 @@ from quietbus.analysis.jitter.sweep import (
     bearing_modes,
     critical_speeds,
 )
+from quietbus.analysis.jitter.worst import WorstAngles, worst_angles
 from quietbus.arguments import choice, listing, positive
 from quietbus.arguments import count as whole
 from quietbus.build import build_satellite

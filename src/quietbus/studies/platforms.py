@@ -10,7 +10,8 @@ from scipy.integrate import trapezoid
 
 from quietbus.analysis.control.coupled import CoupledAnalysis, analyze_coupled
 from quietbus.analysis.control.pid import PID
-from quietbus.analysis.jitter.lines import AT_REST, Combined, combine
+from quietbus.analysis.jitter.combine import Combined, combine
+from quietbus.analysis.jitter.lines import AT_REST
 from quietbus.analysis.jitter.platforms import Platforms
 from quietbus.arguments import choice, vector
 from quietbus.build import build_satellite

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from quietbus.analysis.jitter.lines import RMS_TIME, combine
+from quietbus.analysis.jitter.combine import RMS_TIME, combine
 
 TIMES = np.array([0.0, 3.7, 41.0])
 SIZE = np.array([1.0 + 0.5j, 0.6 - 0.2j, 0.3j])
