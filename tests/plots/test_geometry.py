@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from quietbus.build import build_satellite
 from quietbus.plots.geometry import geometry_figures
 from quietbus.plots.layout import layout
-from quietbus.plots.pane import Pane
+from quietbus.plots.pane import Plane
 from quietbus.plots.style import new_figure
 from quietbus.scenario import builtin_names, load_scenario
 
@@ -105,7 +105,7 @@ def test_no_two_words_lie_on_each_other(figures):
 
 def test_words_at_one_place_are_one():
     axes = new_figure(2.0, "x").subplots()
-    pane = Pane(axes, (0, 1), 1.0)
+    pane = Plane(axes, 1.0, 0, 1)
     for leg, z in ((0, 0.0), (3, 0.5), (4, 0.9)):
         pane.label([0.2, 0.3, z], f"leg {leg}")
     pane.finish(np.zeros(3))

@@ -11,7 +11,7 @@ import numpy as np
 
 from quietbus.plots.layout import EDGES, Layout, layout
 from quietbus.plots.leg import leg_figure
-from quietbus.plots.pane import Pane
+from quietbus.plots.pane import Pane, View, along, perspective
 from quietbus.plots.style import COLOURS, DASHES, literal, new_figure, style
 from quietbus.scenario import Scenario
 
@@ -21,7 +21,12 @@ if TYPE_CHECKING:
 LEG, MOMENTUM, PLATE, GIMBAL, SIGHT, ROTOR, INK = COLOURS
 BASE = "0.45"
 ALONG = (0.5, 0.35, 0.65, 0.22, 0.78)  # places on a leg for its number, the best first
-VIEWS = {"from above": (0, 1), "from the front (along y)": (0, 2), "from the side": (1, 2)}
+VIEWS: dict[str, View] = {
+    "in perspective": perspective,
+    "from above": along(0, 1),
+    "from the front (along y)": along(0, 2),
+    "from the side": along(1, 2),
+}
 
 
 def geometry_figures(scenario: Scenario) -> dict[str, Figure]:
@@ -43,14 +48,12 @@ def platform(scenario: Scenario, placed: Layout) -> Figure:
     figure = new_figure(7.6, f"Platform, bus frame ({scenario.name}{mount})")
     around, reach = _extent(placed)
     grid = figure.add_gridspec(2, 2, height_ratios=(1.0, 0.62), wspace=0.2)
-    for k, (name, plane) in enumerate([("in perspective", None), *VIEWS.items()]):
-        spot = grid[divmod(k, 2)]
-        projection: Any = "3d" if plane is None else None
-        pane = Pane(figure.add_subplot(spot, projection=projection), plane, placed.size)
+    for k, (name, view) in enumerate(VIEWS.items()):
+        pane = view(figure, grid[divmod(k, 2)], placed.size)
         pane.axes.set_title(name)
         _plates(pane, placed)
         _units(pane, placed, reach)
-        _legs(pane, scenario, placed, named=plane is not None)
+        _legs(pane, scenario, placed, named=pane.shows_all)
         pane.bound(around, 0.1 * placed.size)
         pane.finish(around.mean(axis=0))
     _legend(figure, pane, _momentum_note(placed))
@@ -61,7 +64,7 @@ def satellite(scenario: Scenario, placed: Layout) -> Figure:
     """Bus, platform and lines of sight in perspective."""
     figure = new_figure(6.2, f"Satellite ({scenario.name})")
     size = float(np.max(np.ptp(placed.corners_B, axis=0)))
-    pane = Pane(figure.add_subplot(projection="3d"), None, size)
+    pane = perspective(figure, 111, size)
     for i, (a, b) in enumerate(EDGES):
         label = "bus, as a cuboid" if i == 0 else None
         look: dict[str, Any] = {"color": BASE, "linewidth": 0.9, "linestyle": DASHES[1]}
@@ -90,7 +93,7 @@ def frames(scenario: Scenario, placed: Layout) -> Figure:
     """The frames of bus, base plate, upper plate and first unit, and what lies between them."""
     figure = new_figure(6.4, f"Frames ({scenario.name})")
     first, size = placed.units[0], placed.size
-    pane = Pane(figure.add_subplot(projection="3d"), None, size)
+    pane = perspective(figure, 111, size)
     _plates(pane, placed)
     origins = {"B": np.zeros(3), "D": placed.p_BD_B, "P": placed.p_BP_B, "G": first.position}
     _triad(pane, origins["B"], np.eye(3), 0.3 * size, "B")
@@ -133,10 +136,9 @@ def units(scenario: Scenario, placed: Layout) -> Figure:
     points = np.array([unit.position for unit in placed.units])
     ends = np.concatenate([points + reach * sign * v for sign in (-1, 1) for v in np.eye(3)])
     grid = figure.add_gridspec(1, 2, width_ratios=(1.15, 1.0), wspace=0.2)
-    for k, plane in enumerate((None, (0, 1))):
-        projection: Any = "3d" if plane is None else None
-        pane = Pane(figure.add_subplot(grid[k], projection=projection), plane, placed.size)
-        pane.axes.set_title("in perspective" if plane is None else "from above")
+    for k, name in enumerate(("in perspective", "from above")):
+        pane = VIEWS[name](figure, grid[k], placed.size)
+        pane.axes.set_title(name)
         pane.fill(_ring(placed.upper_B, placed.R_BD), PLATE, "upper plate")
         _units(pane, placed, reach)
         pane.bound([*ends, *placed.upper_B], 0.05 * placed.size)
