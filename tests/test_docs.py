@@ -9,16 +9,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 import typer
+from ruamel.yaml import YAML
 
 import quietbus as qb
 from oracles.pages import assert_rounds, assert_shown, table
 from quietbus import cli
 from quietbus.analysis.pointing.windows import METRICS
-from quietbus.results import CONTROL_VARIABLES, JOINT_VARIABLES, ROTOR_VARIABLES, VARIABLES, Summary
+from quietbus.results import (
+    CHANGING_VARIABLES,
+    CONTROL_VARIABLES,
+    JOINT_VARIABLES,
+    VARIABLES,
+    Summary,
+)
 from quietbus.scenario import builtin_names
 from quietbus.scenario.base import Count, Part
 from quietbus.scenario.control import LAWS
 from quietbus.scenario.hardware import Unit
+from quietbus.scenario.sites import Payload, Platform
 from quietbus.scenario.units import Quantity
 from quietbus.scenario.wheels import Wheel
 
@@ -112,7 +120,7 @@ def test_results_page_has_every_variable_with_dimensions_and_unit():
         _unquoted(name): (tuple(dimensions.split(", ")) if dimensions else (), unit)
         for name, dimensions, unit, _, _ in table(_text("docs/results.md"), heading)
     }
-    variables = VARIABLES | CONTROL_VARIABLES | ROTOR_VARIABLES | JOINT_VARIABLES
+    variables = VARIABLES | CONTROL_VARIABLES | CHANGING_VARIABLES | JOINT_VARIABLES
     described = {name: (dims, unit) for name, (dims, unit, _) in variables.items()}
     assert documented == described
 
@@ -187,6 +195,32 @@ def test_scenario_page_has_every_key_with_unit_and_default():
         assert _same_default(_unquoted(default), true_default), f"{key}: {true_default}"
 
 
+@pytest.mark.parametrize(
+    "block", [code for kind, code in FENCE.findall(_text("docs/scenario.md")) if kind == "yaml"]
+)
+def test_yaml_of_the_scenario_page_is_read(block):
+    """Each block put into the built-in satellite in place of what that has."""
+    shown = YAML(typ="safe").load(block)
+    if "rotor" in shown:
+        shown = {"cluster": shown}
+    whole = _put(qb.load_scenario("zhang2012").to_dict(), shown)
+    scenario = qb.Scenario.from_dict(whole)
+    assert qb.Scenario.from_yaml(scenario.to_yaml()) == scenario
+    assert scenario != qb.load_scenario("zhang2012")
+
+
+def _put(data: dict, shown: dict) -> dict:
+    """Data with what is shown; a strut takes the place of stiffness and damping."""
+    if "strut" in shown:
+        data = {key: value for key, value in data.items() if key not in ("stiffness", "damping")}
+    inner = {
+        key: _put(data[key], value)
+        for key, value in shown.items()
+        if isinstance(value, dict) and isinstance(data.get(key), dict)
+    }
+    return data | shown | inner
+
+
 def test_scenario_page_names_every_choice():
     page = _text("docs/scenario.md")
     for word in (*LAWS, "isolated", "rigid", "bus", "plate", "body", "inertial", "constant"):
@@ -195,7 +229,7 @@ def test_scenario_page_names_every_choice():
 
 def test_glossary_names_what_exists():
     known = {key for key, _ in _keys(qb.Scenario)} | set(METRICS) | {"jitter_change_error"}
-    known |= set(VARIABLES | ROTOR_VARIABLES | JOINT_VARIABLES)
+    known |= set(VARIABLES | CHANGING_VARIABLES | JOINT_VARIABLES)
     known |= {f"quietbus {name}" for name in typer.main.get_command(cli.app).commands} | {
         f"qb.{name}" for name in qb.__all__
     }
@@ -217,8 +251,8 @@ def _keys(model: type[Part], prefix: str = ""):
         unit = units[0] or "-" if units else "-" if count else ""
         default = "required" if field.is_required() else field.default
         key = prefix + name
-        if model in (Unit, Wheel):
-            parts = []  # its rotor and other parts have the keys of the cluster's
+        if model in (Unit, Wheel, Platform, Payload):
+            parts = []  # its rotor, isolator and other parts have the keys of the one that is told
         yield key, (bool(parts), unit, default)
         named = typing.get_origin(_bare(hints[name])) is dict
         for part in parts:
@@ -262,6 +296,6 @@ def _same_default(documented: str, default) -> bool:
         value = json.loads(documented)
     except ValueError:
         return False
-    if isinstance(default, bool):
-        return value is default
+    if isinstance(default, bool | dict):
+        return value == default
     return np.shape(value) == np.shape(default) and np.allclose(value, default, rtol=1e-4)

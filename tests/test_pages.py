@@ -29,6 +29,8 @@ def _commands():
         lines += [line for code in blocks for line in code.replace("\\\n", " ").splitlines()]
         for line in lines:
             words = shlex.split(line, comments=True) if line.startswith("quietbus ") else []
+            if words[1:2] == ["--parts"]:  # before the command
+                del words[1:3]
             if len(words) > 2 and words[1] != "COMMAND" and not set(words) & {"|", "--help"}:
                 yield pytest.param(words[1:], id=f"{name}: {line}")
 

@@ -19,6 +19,8 @@ CONTRACT = {  # variable: (dimensions, unit), design/interface.md
     "platform_rate": (("time", "axis"), "rad/s"),
     "gimbal_angle": (("time", "cmg"), "rad"),
     "gimbal_rate": (("time", "cmg"), "rad/s"),
+    "rotor_angle": (("time", "cmg"), "rad"),
+    "rotor_speed": (("time", "cmg"), "rad/s"),
     "leg_stroke": (("time", "leg"), "m"),
     "leg_force": (("time", "leg"), "N"),
     "control_torque": (("time", "axis"), "N m"),

@@ -58,7 +58,7 @@ def test_what_the_papers_leg_spin_misses(slew, legs):
     assert_says(THEORY, r"\sqrt{1-\kappa^2} = #$ rad/s, or $#$ N m s per leg", spin, axial * spin)
     start = Rotation.from_euler("ZYX", slew.initial.attitude[::-1])
     turn = (start.inv() * Rotation.from_euler("ZYX", slew.target.attitude[::-1])).as_rotvec()
-    inertia = np.asarray(build_satellite(slew).controller.J_feedforward_B)
+    inertia = np.asarray(build_satellite(slew).control.controller.J_feedforward_B)
     momentum = rate * np.linalg.norm(inertia @ turn) / np.linalg.norm(turn)
     assert_says(
         THEORY,

@@ -29,7 +29,7 @@ from .scenario import WheelTable as WheelTable
 from .scenario import load_scenario as load_scenario
 from .scenario import per_cmg_scenarios as per_cmg_scenarios
 from .scenario import read_wheel_table as read_wheel_table
-from .solve.harmonic import ResonanceError as ResonanceError
+from .solve.validity import ResonanceError as ResonanceError
 from .studies.jitter import JitterStudy as JitterStudy
 from .studies.platforms import PlatformStudy as PlatformStudy
 from .studies.verification import Verification as Verification

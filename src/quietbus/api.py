@@ -21,7 +21,8 @@ from quietbus.asked import (
     tell_implausible,
 )
 from quietbus.build import build_satellite
-from quietbus.dynamics.linearize import Actuator, LinearModel, OperatingPoint
+from quietbus.dynamics.linear_model import LinearModel
+from quietbus.dynamics.linearize import Actuation, OperatingPoint
 from quietbus.dynamics.linearize import linearize as linearize_satellite
 from quietbus.methods import Direct, Method, as_method
 from quietbus.results import method_of, scenario_of, summarize
@@ -172,8 +173,7 @@ def worst_over_phases(run: xr.Dataset) -> np.ndarray | None:
     if method_of(run).jitter_apart:
         return summarize(run).worst_phases_rate
     last = run.isel(time=-1)
-    speed = last["rotor_speed"].to_numpy() if "rotor_speed" in run else None
-    angles = last["gimbal_angle"].to_numpy()
+    angles, speed = (last[name].to_numpy() for name in ("gimbal_angle", "rotor_speed"))
     return worst_phases_at_rest(scenario, run.attrs["mount"], angles, speed)
 
 
@@ -302,7 +302,7 @@ def linearize(
     rate: ArrayLike | None = None,
     gimbal_angles: ArrayLike | None = None,
     mount: Mount | None = None,
-    actuator: Actuator = "servo",
+    actuator: Actuation = "servo",
     points: Mapping[str, ArrayLike] | None = None,
 ) -> LinearModel:
     """The uncontrolled satellite, linearised exactly; ``.to_control()`` makes a StateSpace of it.

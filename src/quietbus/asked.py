@@ -13,7 +13,6 @@ from quietbus.processes import start_computing
 from quietbus.results.task import Task
 from quietbus.scenario import LineOfSight, Scenario, load_scenario
 from quietbus.scenario.plausibility import implausible
-from quietbus.scenario.wheels import WheelCluster
 from quietbus.studies.resolution import refuse_coarse_output
 
 Mount = Literal["isolated", "rigid"]
@@ -60,10 +59,10 @@ def _checked(path: str, value: Any) -> Any:
 
 def angles_asked(scenario: Scenario, angles: ArrayLike | None) -> np.ndarray:
     """(cmg,) gimbal angles [rad], the scenario's own unless given."""
-    count = scenario.cluster.count
-    if angles is not None and isinstance(scenario.cluster, WheelCluster):
+    count = scenario.units.count
+    if angles is not None and not scenario.units.gimbals_turn:
         raise ValueError("gimbal angles: expected none, since reaction wheels have no gimbals")
-    own = scenario.cluster.gimbal_angles or np.zeros(count)
+    own = scenario.units.gimbal_angles
     return vector("gimbal angles", own if angles is None else angles, count)
 
 
@@ -83,7 +82,7 @@ def task_asked(
     points, lines_of_sight = points or {}, lines_of_sight or {}
     if joint_forces and method.jitter_apart:
         raise ValueError("joint_forces needs method 'direct'")
-    if joint_forces and scenario.isolator.mount == "rigid":
+    if joint_forces and scenario.mount == "rigid":
         raise ValueError(
             "joint_forces needs mount 'isolated': on a rigid mount the legs' forces are not "
             "determined, since the plate is held by the mount and not by the legs"
@@ -94,7 +93,7 @@ def task_asked(
         refuse_coarse_output(scenario)
         return Task(scenario, method, joint_forces)
     at = {name: vector(f"points[{name!r}]", p, 3) for name, p in points.items()}
-    own = {name: line.matrix() for name, line in scenario.lines_of_sight.items()}
+    own = {name: scenario.sight(name).matrix() for name in scenario.lines_of_sight}
     lines = {
         name: _sensitivity(f"lines_of_sight[{name!r}]", each)
         for name, each in (own | dict(lines_of_sight)).items()

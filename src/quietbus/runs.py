@@ -16,8 +16,9 @@ from quietbus.results.checkpoint import Checkpoint
 from quietbus.results.size import check_space
 from quietbus.results.task import Task
 from quietbus.solve.direct import Reached, Scheme, Tolerances, integrate
-from quietbus.solve.harmonic import integrate_harmonic, on_periodic_solution
+from quietbus.solve.harmonic import integrate_harmonic
 from quietbus.solve.noise import with_noise
+from quietbus.solve.periodic import on_periodic_solution
 from quietbus.studies.resolution import refuse_coarse_tolerance, unseen
 
 Notes = tuple[str, ...]
@@ -94,7 +95,7 @@ def _(
     if scenario.initial.steady and keeping.start is None:
         state = on_periodic_solution(satellite, state)
     solution = integrate(
-        with_noise(satellite, scenario.cluster.seeds, scenario.simulation.duration),
+        with_noise(satellite, scenario.units.seeds, scenario.simulation.duration),
         state,
         scenario.simulation.duration,
         scenario.simulation.output_rate,
@@ -142,5 +143,4 @@ def unshown(task: Task, run: xr.Dataset) -> str:
     """What the output rate could not show, as only the run tells, or nothing."""
     if task.method.jitter_apart:
         return ""
-    speeds = run["rotor_speed"].to_numpy() if "rotor_speed" in run else None
-    return unseen(task.scenario, run["gimbal_rate"].to_numpy(), speeds)
+    return unseen(task.scenario, run["gimbal_rate"].to_numpy(), run["rotor_speed"].to_numpy())

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import equinox as eqx
 import jax
@@ -12,11 +13,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import eigh
 
-from oracles.satellites import awkward_satellite, paper_satellite
-from quietbus.dynamics.closed_loop import external_wrench, initial_state, rotor_angles, state_rate
-from quietbus.dynamics.equations import Accelerations, Wrench, plate_motion
-from quietbus.dynamics.invariants import body_motions, joint_motion, kinetic_energy
-from quietbus.dynamics.joint_forces import joint_forces
+from oracles.satellites import awkward_satellite, paper_satellite, with_control, with_units
+from oracles.two_bodies import changed, names_of, seen
+from quietbus.dynamics.closed_loop import evaluate, initial_state, state_rate
+from quietbus.dynamics.equations import moving
+from quietbus.dynamics.invariants import kinetic_energy, rigid_parts
+from quietbus.dynamics.outputs import joined, told
+from quietbus.model.legs.rigid_parts import joint_motion
 from quietbus.model.load import Constant, Load
 from quietbus.spatial.inertia import point_inertia
 from quietbus.spatial.rotation import (
@@ -24,8 +27,8 @@ from quietbus.spatial.rotation import (
     quaternion_to_matrix,
     rotation_vector_to_quaternion,
 )
-from quietbus.validate.states import random_state, random_wrench
-from quietbus.validate.trajectory import fly, held_gimbals, massless_legs
+from quietbus.validate.states import random_state, random_wrenches
+from quietbus.validate.trajectory import fly, held_gimbals, load_on, massless_legs
 
 quickly = settings(deadline=None, max_examples=10)
 seeds = st.integers(0, 10_000)
@@ -50,26 +53,25 @@ def controlled(mount, seed):
     rng = np.random.default_rng(seed)
     satellite = awkward(mount, imbalance=100.0)
     q_NR = rng.normal(size=4)
-    satellite = replace(
-        satellite,
-        guidance=replace(satellite.guidance, q_NR=jnp.asarray(q_NR / np.linalg.norm(q_NR))),
-        loads=body_loads(rng.normal(size=(2, 3, 3))),
-    )
-    return satellite, replace(random_state(satellite, rng), error_integral=rng.normal(size=3))
+    satellite = aimed(satellite, jnp.asarray(q_NR / np.linalg.norm(q_NR)))
+    satellite = replace(satellite, others=body_loads(rng.normal(size=(2, 3, 3))))
+    return satellite, changed(random_state(satellite, rng), error_integral=rng.normal(size=3))
+
+
+def aimed(satellite, q_NR):
+    return with_control(satellite, guidance=replace(satellite.control.guidance, q_NR=q_NR))
 
 
 def body_loads(vectors):
     """Force, torque and point of application on plate and bus, turning with them."""
     each = zip(("plate", "bus"), jnp.asarray(vectors), strict=True)
-    return tuple(Load(body, "body", *rows, Constant()) for body, rows in each)
+    return tuple(Load(f"on {body}", (body,), "body", *rows, Constant()) for body, rows in each)
 
 
 def same_state(found, expected, atol):
-    for name, value in vars(expected).items():
-        if value is None:  # rotors at constant speed have no state of their own
-            assert getattr(found, name) is None
-            continue
-        np.testing.assert_allclose(getattr(found, name), value, atol=atol, err_msg=name)
+    found = names_of(found)
+    for name, value in names_of(expected).items():
+        np.testing.assert_allclose(found[name], value, atol=atol, err_msg=name)
 
 
 # --- closed forms ------------------------------------------------------------------------------
@@ -84,43 +86,49 @@ def test_free_axisymmetric_gyrostat_precesses_at_closed_form_rate(h_z):
     and legs included, is axisymmetric about its mass centre.
     """
     I_t, I_a, w0 = 1300.0, 1700.0, np.array([0.05, -0.03, 0.4])
-    satellite = held_gimbals(paper_satellite("rigid", imbalance=0.0), Wrench.zero())
+    satellite = held_gimbals(paper_satellite("rigid", imbalance=0.0))
     R_PG0 = jnp.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])  # s, t, g = z, x, y
     rotor = jnp.diag(jnp.array([0.5, 0.3, 0.3]))
-    cluster = replace(
-        satellite.cluster,
+    satellite = with_units(
+        satellite,
         R_PG0=jnp.tile(R_PG0, (4, 1, 1)),
         I_RRcm_R=jnp.tile(rotor, (4, 1, 1)),
         rotor_speed=h_z / 0.5 * jnp.array([0.1, 0.2, 0.3, 0.4]),
     )
-    satellite = replace(satellite, cluster=cluster)
-    bodies = body_motions(satellite, jnp.zeros(4), at_rest(satellite))
-    center = bodies.mass @ bodies.p_N / jnp.sum(bodies.mass)
+    bodies = rigid_parts(satellite, jnp.zeros(()), at_rest(satellite))
+    center = bodies.mass @ bodies.p / jnp.sum(bodies.mass)
     others = (
         sum(
             I + point_inertia(m, p - center)
-            for m, I, p in zip(bodies.mass, bodies.I_N, bodies.p_N, strict=True)
+            for m, I, p in zip(bodies.mass, bodies.I, bodies.p, strict=True)
         )
-        - satellite.bus.I_BBcm_B
+        - satellite.bus.I_XXcm_X
     )
-    bus = replace(satellite.bus, I_BBcm_B=jnp.diag(jnp.array([I_t, I_t, I_a])) - others)
-    assert np.linalg.eigvalsh(bus.I_BBcm_B).min() > 100.0
-    satellite = replace(satellite, bus=bus)
+    inertia = jnp.diag(jnp.array([I_t, I_t, I_a])) - others
+    assert np.linalg.eigvalsh(inertia).min() > 100.0
+    satellite = with_bus(satellite, inertia)
 
     times = jnp.linspace(0.0, 10.0, 6)
     start = at_start(satellite, IDENTITY, jnp.asarray(w0), jnp.zeros(4))
-    w = fly(satellite, start, times).w_NB_B
+    w = fly(satellite, start, times).bus.w_NX_X
     turning = ((I_a - I_t) * w0[2] + h_z) / I_t
     expected = (w0[0] + 1j * w0[1]) * np.exp(1j * turning * times)
     np.testing.assert_allclose(w[:, 0] + 1j * w[:, 1], expected, atol=1e-10)
     np.testing.assert_allclose(w[:, 2], w0[2], rtol=1e-10)
 
 
+def with_bus(satellite, inertia, mass=None):
+    """The satellite with another inertia, and mass, of its bus."""
+    bus, *others = satellite.bodies
+    bus = replace(bus, I_XXcm_X=inertia, mass_X=bus.mass_X if mass is None else mass)
+    return replace(satellite, bodies=(bus, *others))
+
+
 def moved(state, x, u):
     """The state at rest after displacements and turns x, with velocities and rates u (12 each)."""
-    return replace(
+    return changed(
         state,
-        p_NP_N=state.p_NP_N + x[:3],
+        p_NP_N=state.bodies["plate"].p_NX_N + x[:3],
         q_NP=rotation_vector_to_quaternion(x[3:6]),
         p_NB_N=x[6:9],
         q_NB=rotation_vector_to_quaternion(x[9:]),
@@ -137,6 +145,7 @@ def _acceleration_along(satellite, x, u):
 
     def accelerations(x, u):
         rate = state_rate(satellite, jnp.zeros(()), moved(state, x, u))
+        rate = seen(rate)
         return jnp.concatenate([rate.v_NP_N, rate.w_NP_P, rate.v_NB_N, rate.w_NB_B])
 
     value, derivative = jax.jvp(accelerations, (zero, zero), (x, u))
@@ -151,8 +160,8 @@ def linearized(satellite):
     return by_x, by_u
 
 
-def _at_rest_under(satellite, wrench):
-    return _stopped(held_gimbals(satellite, wrench))
+def _at_rest_under(satellite, wrenches=None):
+    return _stopped(held_gimbals(satellite, wrenches))
 
 
 @pytest.mark.parametrize(("damping_ratio", "peak"), [(0.1, 5.1228), (0.5, 1.4679), (1.0, 1.1547)])
@@ -165,11 +174,12 @@ def test_strut_transmits_force_as_the_single_axis_isolator(damping_ratio, peak):
     M, k = 82.8, 6 * 2e4 / 3
     c = 2.0 * damping_ratio * np.sqrt(k * M)
     satellite = massless_legs(paper_satellite(imbalance=0.0))
-    bus = replace(satellite.bus, mass=jnp.float64(1e10), I_BBcm_B=1e10 * jnp.eye(3))
-    legs = replace(satellite.legs, damping=jnp.full(6, c / 2.0))
-    satellite = replace(satellite, bus=bus, legs=legs)
-    by_x, by_u = linearized(_at_rest_under(satellite, Wrench.zero()))
-    along_z = replace(Wrench.zero(), force_P=jnp.array([0.0, 0.0, 1.0]))
+    satellite = with_bus(satellite, 1e10 * jnp.eye(3), jnp.float64(1e10))
+    (legs,) = satellite.hexapods
+    legs = replace(legs, strut=replace(legs.strut, damping=jnp.full(6, c / 2.0)))
+    satellite = replace(satellite, hexapods=(legs,))
+    by_x, by_u = linearized(_at_rest_under(satellite))
+    along_z = load_on(satellite, "plate", [0.0, 0.0, 1.0])
     zero = jnp.zeros(12)
     by_force = np.asarray(_acceleration_along(_at_rest_under(satellite, along_z), zero, zero)[0])
 
@@ -189,18 +199,19 @@ def test_strut_transmits_force_as_the_single_axis_isolator(damping_ratio, peak):
 
 def test_six_rigid_body_and_six_elastic_modes():
     """Small motions about rest: stiffness from the legs' directions, mass from kinetic energy."""
-    satellite = _at_rest_under(paper_satellite(), Wrench.zero())
+    satellite = _at_rest_under(paper_satellite())
     by_x, by_u = linearized(satellite)
 
-    legs = jax.tree.map(np.asarray, satellite.legs)
-    p_U, p_A = legs.p_PU_P + np.asarray(satellite.p_BP_B), legs.p_BA_B
+    (hexapod,) = jax.tree.map(np.asarray, satellite.hexapods)
+    legs = hexapod.geometry
+    p_U, p_A = legs.p_PU_P + np.asarray(satellite.mounts[0].p_BX_B), legs.p_BA_B
     s = (p_U - p_A) / np.linalg.norm(p_U - p_A, axis=1, keepdims=True)
     stretch = np.hstack([s, np.cross(legs.p_PU_P, s), -s, -np.cross(p_A, s)])
-    K = stretch.T @ (legs.stiffness[:, None] * stretch)
+    K = stretch.T @ (hexapod.strut.stiffness[:, None] * stretch)
 
     def energy(u):
         state = moved(at_rest(satellite), jnp.zeros(12), u)
-        return kinetic_energy(satellite, satellite.cluster.rotor_phase, state)
+        return kinetic_energy(satellite, jnp.zeros(()), state)
 
     unit = jnp.eye(12)
     pairs = (unit[:, None] + unit).reshape(-1, 12)
@@ -225,25 +236,23 @@ def test_six_rigid_body_and_six_elastic_modes():
 @pytest.mark.parametrize("phi", [0.0, 1.0, 4.0])
 def test_rotor_imbalance_shakes_a_heavy_bus_by_its_closed_forms(unit, phi):
     """m e Omega^2 outwards along the imbalance, and I_xy Omega^2 across it, on a rigid mount."""
-    satellite = replace(paper_satellite("rigid"), loads=body_loads(np.zeros((2, 3, 3))))
-    heavy = replace(satellite.bus, mass=jnp.float64(1e11), I_BBcm_B=1e11 * jnp.eye(3))
+    satellite = replace(paper_satellite("rigid"), others=body_loads(np.zeros((2, 3, 3))))
     speed = 200.0 * np.pi * (jnp.arange(4) == unit)
-    cluster = replace(satellite.cluster, rotor_speed=speed, rotor_phase=jnp.full(4, phi))
-    satellite = replace(satellite, bus=heavy, cluster=cluster)
-    found = rate_of(satellite, jnp.zeros(()), at_rest(satellite))
-    s, t, g = np.asarray(satellite.cluster.R_PG0[unit]).T
+    satellite = with_units(satellite, rotor_speed=speed, rotor_phase=jnp.full(4, phi))
+    satellite = with_bus(satellite, 1e11 * jnp.eye(3), jnp.float64(1e11))
+    found = seen(rate_of(satellite, jnp.zeros(()), at_rest(satellite)))
+    s, t, g = np.asarray(satellite.clusters[0].units.R_PG0[unit]).T
     outwards, across = np.cos(phi) * t + np.sin(phi) * g, np.cos(phi) * g - np.sin(phi) * t
     np.testing.assert_allclose(np.cross(s, outwards), across, atol=1e-12)
     force = 1.36e-5 * (200.0 * np.pi) ** 2 * outwards  # g cm in kg m
-    arm = np.asarray(satellite.p_BP_B + satellite.cluster.p_PC_P[unit])
+    arm = np.asarray(satellite.mounts[0].p_BX_B + satellite.clusters[0].units.p_PC_P[unit])
     torque = 17e-7 * (200.0 * np.pi) ** 2 * across  # g cm^2 in kg m^2
     np.testing.assert_allclose(1e11 * found.v_NB_N, force, atol=1e-6)
     np.testing.assert_allclose(1e11 * found.w_NB_B, torque + np.cross(arm, force), atol=1e-6)
 
 
 def _stopped(satellite):
-    cluster = replace(satellite.cluster, rotor_speed=jnp.zeros(4))
-    return replace(satellite, cluster=cluster)
+    return with_units(satellite, rotor_speed=jnp.zeros(4))
 
 
 # --- symmetries --------------------------------------------------------------------------------
@@ -251,18 +260,17 @@ def _stopped(satellite):
 
 def in_rotated_space(satellite, state, q, shift, velocity):
     """Satellite, target and motion turned by q, moved and set moving in inertial space."""
-    R = quaternion_to_matrix(q)
-    guidance = replace(satellite.guidance, q_NR=quaternion_multiply(q, satellite.guidance.q_NR))
-    turned = replace(
-        state,
-        p_NB_N=R @ state.p_NB_N + shift,
-        p_NP_N=R @ state.p_NP_N + shift,
-        v_NB_N=R @ state.v_NB_N + velocity,
-        v_NP_N=R @ state.v_NP_N + velocity,
-        q_NB=quaternion_multiply(q, state.q_NB),
-        q_NP=quaternion_multiply(q, state.q_NP),
-    )
-    return replace(satellite, guidance=guidance), turned
+    R, now = quaternion_to_matrix(q), names_of(state)
+    turned = {}
+    for name, value in now.items():
+        if name.startswith("p_"):
+            turned[name] = R @ value + shift
+        elif name.startswith("v_"):
+            turned[name] = R @ value + velocity
+        elif name.startswith("q_"):
+            turned[name] = quaternion_multiply(q, value)
+    target = quaternion_multiply(q, satellite.control.guidance.q_NR)
+    return aimed(satellite, target), changed(state, **turned)
 
 
 def rate_in_rotated_space(rate, q, velocity):
@@ -296,56 +304,43 @@ def mirrored(satellite, state):
     """
     S = jnp.array([1.0, -1.0, 1.0])
     both, turned = S[:, None] * S, jnp.array([1.0, -1.0, 1.0, -1.0])  # of matrices, quaternions
-    bus = replace(satellite.bus, I_BBcm_B=both * satellite.bus.I_BBcm_B)
-    plate = replace(
-        satellite.plate,
-        p_PPcm_P=S * satellite.plate.p_PPcm_P,
-        I_PPcm_P=both * satellite.plate.I_PPcm_P,
+    bodies = tuple(
+        replace(body, p_XXcm_X=S * body.p_XXcm_X, I_XXcm_X=both * body.I_XXcm_X)
+        for body in satellite.bodies
     )
-    legs = satellite.legs
-    legs = replace(legs, p_PU_P=S * legs.p_PU_P, p_BA_B=S * legs.p_BA_B, k_B=S * legs.k_B)
-    cluster = satellite.cluster
-    cluster = replace(
-        cluster,
-        p_PC_P=S * cluster.p_PC_P,
-        R_PG0=-S[:, None] * cluster.R_PG0,
-        p_CGcm_G=-cluster.p_CGcm_G,
-        p_CR_G=-cluster.p_CR_G,
-        eccentricity=-cluster.eccentricity,
+    (legs,), (mount,), (cluster,) = satellite.hexapods, satellite.mounts, satellite.clusters
+    joints, units = legs.geometry, cluster.units
+    joints = replace(joints, p_PU_P=S * joints.p_PU_P, p_BA_B=S * joints.p_BA_B, k_B=S * joints.k_B)
+    units = replace(
+        units,
+        p_PC_P=S * units.p_PC_P,
+        R_PG0=-S[:, None] * units.R_PG0,
+        p_CGcm_G=-units.p_CGcm_G,
+        p_CR_G=-units.p_CR_G,
+        eccentricity=-units.eccentricity,
     )
     loads = tuple(
         replace(load, force=S * load.force, torque=-S * load.torque, point=S * load.point)
-        for load in satellite.loads
+        for load in satellite.others
     )
     seen = replace(
         satellite,
-        bus=bus,
-        plate=plate,
-        legs=legs,
-        cluster=cluster,
-        p_BP_B=S * satellite.p_BP_B,
-        q_BP=turned * satellite.q_BP,
-        guidance=replace(satellite.guidance, q_NR=turned * satellite.guidance.q_NR),
-        loads=loads,
+        bodies=bodies,
+        mounts=(replace(mount, p_BX_B=S * mount.p_BX_B, q_BX=turned * mount.q_BX),),
+        hexapods=(replace(legs, geometry=joints),),
+        clusters=(replace(cluster, units=units),),
+        others=loads,
     )
-    return seen, mirrored_state(state)
+    return aimed(seen, turned * satellite.control.guidance.q_NR), mirrored_state(state)
 
 
 def mirrored_state(state):
     """Also of a state's rate."""
     S, turned = jnp.array([1.0, -1.0, 1.0]), jnp.array([1.0, -1.0, 1.0, -1.0])
-    return replace(
-        state,
-        p_NB_N=S * state.p_NB_N,
-        p_NP_N=S * state.p_NP_N,
-        v_NB_N=S * state.v_NB_N,
-        v_NP_N=S * state.v_NP_N,
-        q_NB=turned * state.q_NB,
-        q_NP=turned * state.q_NP,
-        w_NB_B=-S * state.w_NB_B,
-        w_NP_P=-S * state.w_NP_P,
-        error_integral=-S * state.error_integral,
-    )
+    factor = {"p": S, "v": S, "q": turned, "w": -S, "error": -S}
+    now = names_of(state)
+    seen = {name: factor.get(name.split("_")[0], 1.0) * value for name, value in now.items()}
+    return changed(state, **seen)
 
 
 @pytest.mark.parametrize("mount", MOUNTS)
@@ -365,13 +360,13 @@ def test_labels_of_legs_and_cmgs_mean_nothing(mount, seed, leg_order, cmg_order)
     legs, cmgs = np.array(leg_order), np.array(cmg_order)
 
     def relabelled(state):
-        gimbals = (state.gimbal_angle[cmgs], state.gimbal_rate[cmgs])
-        return replace(state, gimbal_angle=gimbals[0], gimbal_rate=gimbals[1])
+        gimbals = (state.own["cluster"].y[cmgs], state.own["cluster"].y_rate[cmgs])
+        return changed(state, gimbal_angle=gimbals[0], gimbal_rate=gimbals[1])
 
+    units = jax.tree.map(lambda value: value[cmgs], satellite.clusters[0].units)
     other = replace(
-        satellite,
-        legs=jax.tree.map(lambda value: value[legs], satellite.legs),
-        cluster=jax.tree.map(lambda value: value[cmgs], satellite.cluster),
+        with_units(satellite, **vars(units)),
+        hexapods=jax.tree.map(lambda value: value[legs], satellite.hexapods),
     )
     found = rate_of(other, T0, relabelled(state))
     same_state(found, relabelled(rate_of(satellite, T0, state)), atol=1e-8)
@@ -383,7 +378,7 @@ def test_motion_is_the_same_in_rotated_space_and_mirrored_in_a_mirror():
     satellite, state = controlled("isolated", 1)
     times = jnp.array([0.0, 0.05])
     end = jax.tree.map(lambda value: value[-1], fly(satellite, state, times, 1e-11))
-    assert np.abs(end.v_NP_N - state.v_NP_N).max() > 0.1
+    assert np.abs(end.bodies["plate"].v_NX_N - state.bodies["plate"].v_NX_N).max() > 0.1
 
     q, shift = rotation_vector_to_quaternion(jnp.array([0.5, 1.5, -1.0])), jnp.ones(3)
     other, start = in_rotated_space(satellite, state, q, shift, jnp.zeros(3))
@@ -397,44 +392,76 @@ def test_motion_is_the_same_in_rotated_space_and_mirrored_in_a_mirror():
 # --- joints ------------------------------------------------------------------------------------
 
 
-@eqx.filter_jit
 def balances(satellite, state, rate):
     """Rates of linear and angular momentum of all bodies; joint forces and motion."""
+    *rates, forces, joints = _balances(satellite, state, rate)
+    return *rates, SimpleNamespace(**forces), SimpleNamespace(**joints)
+
+
+@eqx.filter_jit
+def _balances(satellite, state, rate):
 
     def momenta(t, state):
-        bodies = body_motions(satellite, rotor_angles(satellite, t, state), state)
-        linear = bodies.mass[:, None] * bodies.v_N
-        angular = jnp.cross(bodies.p_N, linear) + jnp.einsum("bij,bj->bi", bodies.I_N, bodies.w_N)
+        bodies = rigid_parts(satellite, t, state)
+        linear = bodies.mass[:, None] * bodies.v
+        angular = jnp.cross(bodies.p, linear) + jnp.einsum("bij,bj->bi", bodies.I, bodies.w)
         return linear, angular
 
     _, rates = jax.jvp(momenta, (T0, state), (jnp.ones(()), rate))
-    w_P = quaternion_to_matrix(state.q_NP) @ rate.w_NP_P
-    w_B = quaternion_to_matrix(state.q_NB) @ rate.w_NB_B
-    acceleration = Accelerations(rate.v_NP_N, w_P, rate.v_NB_N, w_B)
-    return *rates, joint_forces(satellite, state, acceleration), joint_motion(satellite, state)
+    found = joined(told(satellite, state, evaluate(satellite, T0, state), detailed=True))
+    return *rates, found, _joints(satellite, state)
+
+
+def _joints(satellite, state):
+    """Motion of the legs, and how they turn in plate and bus."""
+    now = moving(satellite, T0, state)
+    P, B = now.motions["plate"], now.motions["bus"]
+    joints = joint_motion(satellite.hexapods[0].geometry, P, B)
+    relative = {"w_leg_in_plate_N": joints.w - P.w, "w_leg_in_bus_N": joints.w - B.w}
+    return {"length": joints.length, "length_rate": joints.length_rate, **relative}
+
+
+# where the rigid parts of each are: the order of the elements
+BUS, PLATE, LOWER, UPPER, UNITS = (
+    slice(0, 1),
+    slice(1, 2),
+    slice(2, 8),
+    slice(8, 14),
+    slice(14, 22),
+)
 
 
 def joint_case(seed):
     satellite, state = controlled("isolated", seed)
-    wrench = external_wrench(satellite, T0, plate_motion(state))
-    R_NB, R_NP = quaternion_to_matrix(state.q_NB), quaternion_to_matrix(state.q_NP)
-    p_U = np.asarray(state.p_NP_N + satellite.legs.p_PU_P @ R_NP.T)
-    p_A = np.asarray(state.p_NB_N + satellite.legs.p_BA_B @ R_NB.T)
+    R_NB = quaternion_to_matrix(state.bus.q_NX)
+    R_NP = quaternion_to_matrix(state.bodies["plate"].q_NX)
+    wrench = [_pushed(load, R) for load, R in zip(satellite.others, (R_NP, R_NB), strict=True)]
+    p_U = np.asarray(state.bodies["plate"].p_NX_N + satellite.hexapods[0].geometry.p_PU_P @ R_NP.T)
+    p_A = np.asarray(state.bus.p_NX_N + satellite.hexapods[0].geometry.p_BA_B @ R_NB.T)
     linear, angular, forces, joints = balances(satellite, state, rate_of(satellite, T0, state))
-    friction_U = -satellite.legs.spherical_friction[:, None] * joints.w_leg_in_plate_N
-    friction_A = -satellite.legs.universal_friction[:, None] * joints.w_leg_in_bus_N
+    friction_U = -satellite.hexapods[0].bodies.spherical_friction[:, None] * joints.w_leg_in_plate_N
+    friction_A = -satellite.hexapods[0].bodies.universal_friction[:, None] * joints.w_leg_in_bus_N
     at_U = forces.spherical_force, np.cross(p_U, forces.spherical_force) + friction_U
     moment = forces.universal_moment[:, None] * forces.universal_axis
     at_A = forces.universal_force, np.cross(p_A, forces.universal_force) + friction_A + moment
-    return satellite, state, wrench, (np.asarray(linear), np.asarray(angular)), at_U, at_A, forces
+    return (
+        satellite,
+        state,
+        wrench,
+        (np.asarray(linear), np.asarray(angular)),
+        at_U,
+        at_A,
+        forces,
+        joints,
+    )
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_joint_forces_are_what_moves_each_leg(seed):
     """Newton and Euler for each leg alone: F_s + F_u, their moments, M_u and friction."""
-    _, _, _, rates, at_U, at_A, _ = joint_case(seed)
+    _, _, _, rates, at_U, at_A, *_ = joint_case(seed)
     for rate, upper, lower in zip(rates, at_U, at_A, strict=True):
-        of_leg = rate[10:16] + rate[16:22]  # lower and upper part
+        of_leg = rate[LOWER] + rate[UPPER]
         assert np.abs(of_leg).max() > 1.0
         np.testing.assert_allclose(upper + lower, of_leg, atol=1e-8)
 
@@ -442,30 +469,34 @@ def test_joint_forces_are_what_moves_each_leg(seed):
 @pytest.mark.parametrize("seed", range(3))
 def test_joint_forces_and_loads_are_what_moves_plate_and_bus(seed):
     """Newton and Euler for the plate with all its CMGs, and for the bus, spinning and tumbling."""
-    _, state, wrench, (linear, angular), at_U, at_A, _ = joint_case(seed)
-    p_P, p_B = state.p_NP_N, state.p_NB_N
-    plate = slice(1, 10)  # plate, four gimbal bodies, four rotors
+    _, state, (on_plate, on_bus), rates, at_U, at_A, *_ = joint_case(seed)
     tolerance = {"rtol": 1e-9, "atol": 1e-7}
-    np.testing.assert_allclose(linear[plate].sum(0), wrench.force_P - at_U[0].sum(0), **tolerance)
-    torque = wrench.torque_P + np.cross(p_P, wrench.force_P)
-    np.testing.assert_allclose(angular[plate].sum(0), torque - at_U[1].sum(0), **tolerance)
-    np.testing.assert_allclose(linear[0], wrench.force_B - at_A[0].sum(0), **tolerance)
-    torque = wrench.torque_B + np.cross(p_B, wrench.force_B)
-    np.testing.assert_allclose(angular[0], torque - at_A[1].sum(0), **tolerance)
+    for name, (force, torque), joints, parts in (
+        ("plate", on_plate, at_U, (PLATE, UNITS)),
+        ("bus", on_bus, at_A, (BUS,)),
+    ):
+        linear, angular = (sum(rate[part].sum(0) for part in parts) for rate in rates)
+        moment = torque + np.cross(state.bodies[name].p_NX_N, force)
+        np.testing.assert_allclose(linear, force - joints[0].sum(0), **tolerance)
+        np.testing.assert_allclose(angular, moment - joints[1].sum(0), **tolerance)
+
+
+def _pushed(load, R_NX):
+    """Force and torque of a constant load about its body's origin, inertial."""
+    force = np.asarray(R_NX @ load.force)
+    return force, np.asarray(R_NX @ load.torque) + np.cross(R_NX @ load.point, force)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_struts_alone_push_the_upper_parts_along_the_legs(seed):
     """Along s: m_u a_u = F_s - (k stretch + c stretch rate) s. h is normal to both joint axes."""
-    satellite, state, _, (linear, _), at_U, _, forces = joint_case(seed)
-    legs, joints = satellite.legs, joint_motion(satellite, state)
+    satellite, state, _, (linear, _), at_U, _, forces, joints = joint_case(seed)
+    legs = satellite.hexapods[0].geometry
     s = _directions(satellite, state)
-    tension = (
-        legs.stiffness * (joints.length - legs.free_length) + legs.damping * joints.length_rate
-    )
-    along = np.sum(s * (at_U[0] - linear[16:22]), axis=1)
+    along = np.sum(s * (at_U[0] - linear[UPPER]), axis=1)
+    tension = _tension(satellite, joints)
     np.testing.assert_allclose(along, tension, atol=1e-8)
-    k = np.asarray(legs.k_B @ quaternion_to_matrix(state.q_NB).T)
+    k = np.asarray(legs.k_B @ quaternion_to_matrix(state.bus.q_NX).T)
     np.testing.assert_allclose(np.sum(forces.universal_axis * k, axis=1), np.zeros(6), atol=1e-12)
     np.testing.assert_allclose(
         np.sum(forces.universal_axis * np.cross(k, s), axis=1), np.zeros(6), atol=1e-12
@@ -479,20 +510,24 @@ def test_massless_legs_carry_their_strut_force_and_nothing_else():
     satellite, state = controlled("isolated", 4)
     satellite = massless_legs(satellite)
     _, _, forces, joints = balances(satellite, state, rate_of(satellite, T0, state))
-    legs = satellite.legs
-    tension = (
-        legs.stiffness * (joints.length - legs.free_length) + legs.damping * joints.length_rate
-    )
+    tension = _tension(satellite, joints)
     expected = tension[:, None] * _directions(satellite, state)
     np.testing.assert_allclose(forces.spherical_force, expected, atol=1e-9)
     np.testing.assert_allclose(forces.universal_force, -expected, atol=1e-9)
     np.testing.assert_allclose(forces.universal_moment, np.zeros(6), atol=1e-9)
 
 
+def _tension(satellite, joints):
+    strut = satellite.hexapods[0].strut
+    return (
+        strut.stiffness * (joints.length - strut.free_length) + strut.damping * joints.length_rate
+    )
+
+
 def _directions(satellite, state):
-    R_NB, R_NP = quaternion_to_matrix(state.q_NB), quaternion_to_matrix(state.q_NP)
-    legs = satellite.legs
-    p_U, p_A = state.p_NP_N + legs.p_PU_P @ R_NP.T, state.p_NB_N + legs.p_BA_B @ R_NB.T
+    bus, plate, legs = state.bus, state.bodies["plate"], satellite.hexapods[0].geometry
+    R_NB, R_NP = quaternion_to_matrix(bus.q_NX), quaternion_to_matrix(plate.q_NX)
+    p_U, p_A = plate.p_NX_N + legs.p_PU_P @ R_NP.T, bus.p_NX_N + legs.p_BA_B @ R_NB.T
     return np.asarray((p_U - p_A) / jnp.linalg.norm(p_U - p_A, axis=1, keepdims=True))
 
 
@@ -500,19 +535,21 @@ def _directions(satellite, state):
 
 
 def test_rigid_mount_holds_the_plate_where_the_bus_has_it():
-    """Under loads and strong imbalance, gimbals turning, for half a second."""
+    """What is told of the plate, under loads and strong imbalance, gimbals turning: Poisson."""
     satellite = awkward("rigid", imbalance=100.0)
     rng = np.random.default_rng(2)
     state = random_state(satellite, rng)
-    satellite = held_gimbals(satellite, random_wrench(satellite, rng))
+    satellite = held_gimbals(satellite, random_wrenches(satellite, rng))
     states = fly(satellite, state, jnp.linspace(0.0, 0.5, 6))
-    assert np.abs(states.w_NB_B - state.w_NB_B).max() > 1e-3
+    assert np.abs(states.bus.w_NX_X - state.bus.w_NX_X).max() > 1e-3
+    (mount,) = satellite.mounts
     for i in range(6):
         now = jax.tree.map(lambda value, i=i: value[i], states)
-        held = at_start(satellite, now.q_NB, now.w_NB_B, now.gimbal_angle)
-        pose = (now.p_NP_N - now.p_NB_N, now.v_NP_N - now.v_NB_N, now.w_NP_P)
-        for found, expected in zip(pose, (held.p_NP_N, held.v_NP_N, held.w_NP_P), strict=True):
-            np.testing.assert_allclose(found, expected, atol=1e-9)
-        np.testing.assert_allclose(
-            quaternion_to_matrix(now.q_NP), quaternion_to_matrix(held.q_NP), atol=1e-9
-        )
+        plate = moving(satellite, T0, now).motions["plate"]
+        R_NB = np.asarray(quaternion_to_matrix(now.bus.q_NX))
+        arm, w = R_NB @ mount.p_BX_B, R_NB @ now.bus.w_NX_X
+        np.testing.assert_allclose(plate.p, now.bus.p_NX_N + arm, atol=1e-12)
+        np.testing.assert_allclose(plate.v, now.bus.v_NX_N + np.cross(w, arm), atol=1e-12)
+        np.testing.assert_allclose(plate.w, w, atol=1e-12)
+        R_NP = R_NB @ quaternion_to_matrix(mount.q_BX)
+        np.testing.assert_allclose(plate.R_AX, R_NP, atol=1e-12)

@@ -12,19 +12,24 @@ from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
 import quietbus as qb
-from oracles.satellites import awkward_satellite, paper_satellite
-from quietbus.dynamics.closed_loop import torque_axes
-from quietbus.dynamics.equations import Wrench, accelerations
+from oracles.satellites import (
+    awkward_satellite,
+    paper_satellite,
+    uncontrolled,
+    with_control,
+    with_units,
+)
+from oracles.two_bodies import accelerations_of, two_bodies
 from quietbus.dynamics.linearize import (
     OperatingPoint,
     OperatingPointError,
-    clamped,
     linearize,
     platform_inertia,
 )
-from quietbus.dynamics.state import State
-from quietbus.model.cmg import ClusterMoments
 from quietbus.model.load import Load, Profile
+from quietbus.model.steering import NoSteering
+from quietbus.model.unit import momentum_P
+from quietbus.model.variants import with_base_fixed
 from quietbus.spatial.rotation import quaternion_to_matrix
 from quietbus.validate.mjcf import write_mjcf
 from quietbus.validate.trajectory import fly, held_gimbals, massless_legs
@@ -50,7 +55,7 @@ def placed(pose, x, gamma=GAMMA, rate=ZERO):
     R_B, R_P = Rotation.from_rotvec(theta_B), Rotation.from_rotvec(theta_P) * pose[1]
     arm = pose[0] + r
     speed = v_B + np.cross(rate, p_B)
-    return State(
+    return two_bodies(
         p_NB_N=jnp.asarray(p_B),
         q_NB=quaternion(R_B),
         p_NP_N=jnp.asarray(p_B + arm),
@@ -68,17 +73,19 @@ def placed(pose, x, gamma=GAMMA, rate=ZERO):
 def deviation(state, pose, turned=None, rate=ZERO):
     """Attitudes, plate position and rates of a state, seen in a frame turned with the satellite."""
     back = (turned or Rotation.identity()).inv()
-    R_B, R_P = back * rotation(state.q_NB), back * rotation(state.q_NP)
-    arm = back.apply(np.array(state.p_NP_N - state.p_NB_N))
-    slip = back.apply(np.array(state.v_NP_N - state.v_NB_N)) - np.cross(rate, arm)
+    R_B, R_P = back * rotation(state.bus.q_NX), back * rotation(state.bodies["plate"].q_NX)
+    arm = back.apply(np.array(state.bodies["plate"].p_NX_N - state.bus.p_NX_N))
+    slip = back.apply(np.array(state.bodies["plate"].v_NX_N - state.bus.v_NX_N)) - np.cross(
+        rate, arm
+    )
     return np.concatenate(
         [
             R_B.as_rotvec(),
             arm - pose[0],
             (R_P * pose[1].inv()).as_rotvec(),
-            state.w_NB_B - rate,
+            state.bus.w_NX_X - rate,
             slip,
-            R_P.apply(np.array(state.w_NP_P)) - rate,
+            R_P.apply(np.array(state.bodies["plate"].w_NX_X)) - rate,
         ]
     )
 
@@ -86,25 +93,26 @@ def deviation(state, pose, turned=None, rate=ZERO):
 @eqx.filter_jit
 def nonlinear(satellite, state, bus, plate, command):
     """Accelerations with forces and torques in body axes, gimbals behind their servo."""
-    R_B, R_P = quaternion_to_matrix(state.q_NB), quaternion_to_matrix(state.q_NP)
-    wrench = Wrench(R_P @ plate[:3], R_P @ plate[3:], R_B @ bus[:3], R_B @ bus[3:])
-    gimbal = satellite.servo.bandwidth * (command - state.gimbal_rate)
-    moments = ClusterMoments.expand(satellite.cluster).averaged()
-    return accelerations(satellite, state, 0.0 * gimbal, gimbal, wrench, moments)
+    R_B, R_P = (quaternion_to_matrix(body.q_NX) for body in (state.bus, state.bodies["plate"]))
+    forces = jnp.stack([R_P @ plate[:3], R_P @ plate[3:], R_B @ bus[:3], R_B @ bus[3:]])
+    (cluster,) = satellite.clusters
+    bandwidth = getattr(cluster.gimbals, "bandwidth", 0.0)  # of wheels none
+    driven = bandwidth * (command - state.own["cluster"].y_rate)
+    return accelerations_of(satellite.averaged(), state, driven, forces)
 
 
 def rows(satellite, state, bus=NOTHING, plate=NOTHING, command=HELD):
     """Rates of bus rate, relative plate velocity and plate rate, satellite at rest."""
     args = (jnp.asarray(value) for value in (bus, plate, command))
     a = nonlinear(satellite, state, *args)
-    to_bus = rotation(state.q_NB).as_matrix().T
+    to_bus = rotation(state.bus.q_NX).as_matrix().T
     w_B, v_B, w_P, v_P = (np.array(part) for part in (a.w_B, a.v_B, a.w_P, a.v_P))
     return np.concatenate([to_bus @ w_B, v_P - v_B, w_P])
 
 
 def equilibrium(satellite):
     """Where preloaded struts hold the plate, found by a solver of its own."""
-    nominal = np.array(satellite.p_BP_B), rotation(satellite.q_BP)
+    nominal = np.array(satellite.mounts[0].p_BX_B), rotation(satellite.mounts[0].q_BX)
 
     def pose(y):
         return nominal[0] + y[:3], Rotation.from_rotvec(y[3:]) * nominal[1]
@@ -127,7 +135,9 @@ def test_matrices_are_derivatives_of_the_equations_of_motion(mount):
     satellite = awkward_satellite(mount, imbalance=0.0)
     rigid = mount == "rigid"
     pose = (
-        (np.array(satellite.p_BP_B), rotation(satellite.q_BP)) if rigid else equilibrium(satellite)
+        (np.array(satellite.mounts[0].p_BX_B), rotation(satellite.mounts[0].q_BX))
+        if rigid
+        else equilibrium(satellite)
     )
     model = linearize(satellite, STILL, "servo")
     step = 1e-6
@@ -184,18 +194,24 @@ def test_outputs_are_derivatives_of_what_they_are_named_after():
 
     def measured(x, plate=NOTHING):
         state = placed(pose, x)
-        R_B, R_P = rotation(state.q_NB), rotation(state.q_NP)
-        legs = satellite.legs
-        span = np.asarray(state.p_NP_N - state.p_NB_N) + R_P.apply(np.array(legs.p_PU_P))
-        span = span - R_B.apply(np.array(legs.p_BA_B))
-        w_B, w_P = R_B.apply(np.array(state.w_NB_B)), R_P.apply(np.array(state.w_NP_P))
-        v = np.asarray(state.v_NP_N - state.v_NB_N) + np.cross(
-            w_P, R_P.apply(np.array(legs.p_PU_P))
+        R_B, R_P = rotation(state.bus.q_NX), rotation(state.bodies["plate"].q_NX)
+        (legs,) = satellite.hexapods
+        joints, strut = legs.geometry, legs.strut
+        span = np.asarray(state.bodies["plate"].p_NX_N - state.bus.p_NX_N) + R_P.apply(
+            np.array(joints.p_PU_P)
         )
-        v = v - np.cross(w_B, R_B.apply(np.array(legs.p_BA_B)))
+        span = span - R_B.apply(np.array(joints.p_BA_B))
+        w_B, w_P = (
+            R_B.apply(np.array(state.bus.w_NX_X)),
+            R_P.apply(np.array(state.bodies["plate"].w_NX_X)),
+        )
+        v = np.asarray(state.bodies["plate"].v_NX_N - state.bus.v_NX_N) + np.cross(
+            w_P, R_P.apply(np.array(joints.p_PU_P))
+        )
+        v = v - np.cross(w_B, R_B.apply(np.array(joints.p_BA_B)))
         length = np.linalg.norm(span, axis=1)
         rate = np.sum(span * v, axis=1) / length
-        force = legs.stiffness * (length - legs.free_length) + legs.damping * rate
+        force = strut.stiffness * (length - strut.free_length) + strut.damping * rate
         a = nonlinear(satellite, state, jnp.zeros(6), jnp.asarray(plate), jnp.zeros(4))
         arm = R_B.apply(point)
         here = a.v_B + np.cross(a.w_B, arm) + np.cross(w_B, np.cross(w_B, arm))
@@ -216,7 +232,7 @@ def test_outputs_are_derivatives_of_what_they_are_named_after():
 @pytest.mark.parametrize("actuator", ["servo", "ideal"])
 def test_control_torque_reaches_the_satellite_by_its_actuator(actuator):
     """Ideal: the torque in bus axes on the plate. Servo: the gimbals' answer, dh/dt = -torque."""
-    satellite = replace(awkward_satellite(imbalance=0.0), steering=None)
+    satellite = with_control(awkward_satellite(imbalance=0.0), steering=NoSteering())
     model = linearize(satellite, STILL, actuator)
     B = model.select(["control_torque"]).B
     if actuator == "ideal":
@@ -227,8 +243,11 @@ def test_control_torque_reaches_the_satellite_by_its_actuator(actuator):
     else:
         commands = [f"gimbal_rate_command_{j}" for j in range(4)]
         answer = np.linalg.lstsq(model.select(commands).B, B, rcond=None)[0]
-        axes, h = torque_axes(satellite, jnp.asarray(GAMMA))
-        momentum_rate = np.asarray(quaternion_to_matrix(satellite.q_BP) @ axes * h) @ answer
+        step, R_BP = 1e-6, rotation(satellite.mounts[0].q_BX)
+        units = satellite.clusters[0].units
+        h = lambda gamma: R_BP.apply(np.array(momentum_P(units, jnp.asarray(gamma)).sum(0)))  # noqa: E731
+        by_angle = [(h(GAMMA + step * e) - h(GAMMA - step * e)) / (2 * step) for e in np.eye(4)]
+        momentum_rate = np.stack(by_angle, axis=1) @ answer
         np.testing.assert_allclose(momentum_rate, -np.eye(3), atol=1e-9)
 
 
@@ -238,15 +257,16 @@ def test_control_torque_reaches_the_satellite_by_its_actuator(actuator):
 def symmetric(imbalance=0.0):
     """The paper's satellite with a diagonal bus inertia: it can turn steadily about z."""
     satellite = paper_satellite(imbalance=imbalance)
-    bus = replace(satellite.bus, I_BBcm_B=jnp.diag(jnp.array([1100.0, 900.0, 800.0])))
-    return replace(satellite, bus=bus)
+    bus, plate = satellite.bodies
+    bus = replace(bus, I_XXcm_X=jnp.diag(jnp.array([1100.0, 900.0, 800.0])))
+    return replace(satellite, bodies=(bus, plate))
 
 
 @pytest.mark.slow
 def test_step_response_meets_the_direct_solution_at_second_order():
     """A constant wrench on the plate and bus: what is left out falls with the square."""
     satellite = paper_satellite(imbalance=0.0)
-    pose = np.array(satellite.p_BP_B), rotation(satellite.q_BP)
+    pose = np.array(satellite.mounts[0].p_BX_B), rotation(satellite.mounts[0].q_BX)
     bus = np.array([3.0, -2.0, 1.0, 5.0, 8.0, -6.0])
     plate = np.array([-20.0, 30.0, 10.0, 10.0, 4.0, -9.0])
     model = linearize(satellite, STILL, "servo").select(
@@ -258,9 +278,9 @@ def test_step_response_meets_the_direct_solution_at_second_order():
     linear = expm(grown * duration)[:18, n]
 
     def error(amplitude):
-        load = [jnp.asarray(amplitude * part) for part in np.split(np.append(plate, bus), 4)]
+        loads = amplitude * np.stack([bus.reshape(2, 3), plate.reshape(2, 3)])
         flown = fly(
-            held_gimbals(satellite, Wrench(*load)),
+            held_gimbals(satellite, loads),
             placed(pose, np.zeros(32)),
             jnp.array([0.0, duration]),
         )
@@ -285,7 +305,7 @@ def test_free_motion_about_a_steady_turn_meets_the_direct_solution(spin):
     rng = np.random.default_rng(3)
     x = np.concatenate([rng.normal(size=9) * 1e-2, rng.normal(size=9) * 0.1, np.zeros(14)])
     duration = 0.5
-    held = held_gimbals(satellite, Wrench.zero())
+    held = held_gimbals(satellite)
     turned = Rotation.from_rotvec(rate * duration)
     linear = (expm(model.A * duration) @ x)[:18]
     # the servo of `model` holds the gimbals, as `held` does
@@ -303,7 +323,7 @@ def test_free_motion_about_a_steady_turn_meets_the_direct_solution(spin):
 
 
 def raised(satellite, lift):
-    return np.array(satellite.p_BP_B) + np.array([0.0, 0.0, lift])
+    return np.array(satellite.mounts[0].p_BX_B) + np.array([0.0, 0.0, lift])
 
 
 def _steady_lift(satellite, gamma, rate):
@@ -337,16 +357,17 @@ def test_frequency_response_meets_a_sine_through_the_nonlinear_equations(frequen
     satellite = paper_satellite(imbalance=0.0)
     torque, omega = np.array([0.6, -0.4, 0.5]), 2 * np.pi * frequency
     zero = jnp.zeros(3)
-    load = Load("plate", "body", zero, jnp.asarray(torque), zero, Sine(jnp.asarray(omega)))
-    shaken = replace(satellite, controller=None, steering=None, loads=(load,))
+    sine = Sine(jnp.asarray(omega))
+    load = Load("shaker", ("plate",), "body", zero, jnp.asarray(torque), zero, sine)
+    shaken = uncontrolled(satellite, load)
     times = np.linspace(0.0, 6.0, 1201)
-    pose = np.array(satellite.p_BP_B), rotation(satellite.q_BP)
+    pose = np.array(satellite.mounts[0].p_BX_B), rotation(satellite.mounts[0].q_BX)
     flown = fly(shaken, placed(pose, np.zeros(32)), jnp.asarray(times), 1e-10)
     late = times > 6.0 - 3.0 / frequency
     turn = omega * times[late]
     slow = np.vander(times[late] - 5.0, 4)
     basis = np.column_stack([slow, np.sin(turn), np.cos(turn)])
-    fit = np.linalg.lstsq(basis, np.asarray(flown.w_NB_B)[late], rcond=None)[0]
+    fit = np.linalg.lstsq(basis, np.asarray(flown.bus.w_NX_X)[late], rcond=None)[0]
     model = linearize(satellite, STILL, "servo").select(["plate_torque"], ["bus_rate"])
     expected = model.response(np.array([frequency]))[0] @ torque
     np.testing.assert_allclose(fit[-2] + 1j * fit[-1], expected, atol=2e-3 * abs(expected).max())
@@ -359,9 +380,8 @@ def test_eigenvalues_of_the_free_satellite_are_those_of_mujocos_matrices():
     """Massless legs as tendons, rotors at rest: mass matrix and slopes of MuJoCo's forces."""
     mujoco = pytest.importorskip("mujoco")
     satellite = massless_legs(paper_satellite(imbalance=0.0))
-    cluster = replace(satellite.cluster, rotor_speed=0.0 * satellite.cluster.rotor_speed)
-    satellite = replace(satellite, cluster=cluster)
-    pose = np.array(satellite.p_BP_B), rotation(satellite.q_BP)
+    satellite = with_units(satellite, rotor_speed=jnp.zeros(4))
+    pose = np.array(satellite.mounts[0].p_BX_B), rotation(satellite.mounts[0].q_BX)
     state = placed(pose, np.zeros(32))
     model = mujoco.MjModel.from_xml_string(write_mjcf(satellite, state))
     data = mujoco.MjData(model)
@@ -397,11 +417,11 @@ def test_eigenvalues_of_the_free_satellite_are_those_of_mujocos_matrices():
 
 
 def test_platform_inertia_is_the_papers_and_follows_the_gimbals():
-    mass, center, inertia = platform_inertia(paper_satellite(), np.zeros(4))
+    mass, center, inertia = platform_inertia(paper_satellite(), np.zeros(4), "plate")
     assert mass == pytest.approx(82.8)
     np.testing.assert_allclose(center, 0.0, atol=1e-12)
     np.testing.assert_allclose(inertia, np.diag([8.8, 8.8, 15.0]), atol=0.01)
-    turned = platform_inertia(paper_satellite(), GAMMA)[2]
+    turned = platform_inertia(paper_satellite(), GAMMA, "plate")[2]
     assert np.trace(turned) == pytest.approx(np.trace(inertia))  # turning parts keeps it
     assert np.abs(turned - inertia).max() > 1e-3
 
@@ -463,7 +483,7 @@ def test_a_point_on_a_turning_bus_feels_the_turn_grow():
 
 
 def test_a_heavy_bus_stands_still():
-    model = linearize(clamped(paper_satellite()), STILL, "ideal")
+    model = linearize(with_base_fixed(paper_satellite()), STILL, "ideal")
     rate = model.select(["plate_torque"], ["bus_rate"]).response(np.array([2.0]))
     assert np.abs(rate).max() < 1e-12
 

@@ -1,18 +1,15 @@
 """The linear model of a satellite with reaction wheels, against the nonlinear equations."""
 
-from dataclasses import replace
-
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from dynamics.test_linearize import equilibrium, placed, rotation
-from oracles.satellites import awkward_satellite, with_wheels
-from quietbus.dynamics.equations import Wrench, accelerations
+from oracles.satellites import awkward_satellite, with_cluster, with_wheels
+from oracles.two_bodies import accelerations_of, changed
 from quietbus.dynamics.linearize import OperatingPoint, linearize
-from quietbus.model.cmg import ClusterMoments
-from quietbus.model.rotor import RotorState, WheelMotors
+from quietbus.model.rotors import WheelMotors
 
 REST = OperatingPoint(np.zeros(3), np.zeros(4))
 
@@ -21,8 +18,7 @@ REST = OperatingPoint(np.zeros(3), np.zeros(4))
 def satellite():
     limits = jnp.array([0.1, 0.2, 0.3, 0.4])
     satellite = with_wheels(awkward_satellite(imbalance=0.0))
-    drive = WheelMotors(limits, None)
-    return replace(satellite, cluster=replace(satellite.cluster, drive=drive))
+    return with_cluster(satellite, rotors=WheelMotors(limits, jnp.full(4, jnp.inf)))
 
 
 @pytest.fixture(scope="module")
@@ -32,15 +28,13 @@ def model(satellite):
 
 @eqx.filter_jit
 def _nonlinear(satellite, state, spin_up):
-    moments = ClusterMoments.expand(satellite.cluster).averaged()
-    still = jnp.zeros(4)
-    return accelerations(satellite, state, still, still, Wrench.zero(), moments, spin_up)
+    return accelerations_of(satellite.averaged(), state, spin_up)
 
 
 def test_matrices_are_derivatives_of_the_equations_of_motion(satellite, model):
     """Central differences along random directions of all states and motor torques."""
     pose = equilibrium(satellite)
-    spin_inertia = np.asarray(satellite.cluster.I_RRcm_R[:, 0, 0])
+    spin_inertia = np.asarray(satellite.clusters[0].units.I_RRcm_R[:, 0, 0])
     rng = np.random.default_rng(1)
     rows = [i for i, name in enumerate(model.states) if 9 <= i < 18]
     for _ in range(4):
@@ -49,11 +43,11 @@ def test_matrices_are_derivatives_of_the_equations_of_motion(satellite, model):
 
         def at(side, x=x, torque=torque):
             whole = np.concatenate([side * x[:18], np.zeros(8), np.zeros(6)])
+            speed = satellite.clusters[0].units.rotor_speed + side * x[18:]
             state = placed(pose, whole, np.zeros(4))
-            rotor = RotorState(jnp.zeros(4), satellite.cluster.rotor_speed + side * x[18:])
-            state = replace(state, rotor=rotor)
+            state = changed(state, rotor_angle=jnp.zeros(4), rotor_speed=speed)
             a = _nonlinear(satellite, state, jnp.asarray(side * torque / spin_inertia))
-            to_bus = rotation(state.q_NB).as_matrix().T
+            to_bus = rotation(state.bus.q_NX).as_matrix().T
             w_B, v_B, w_P, v_P = (np.array(part) for part in (a.w_B, a.v_B, a.w_P, a.v_P))
             return np.concatenate([to_bus @ w_B, v_P - v_B, w_P])
 
@@ -65,11 +59,11 @@ def test_matrices_are_derivatives_of_the_equations_of_motion(satellite, model):
 
 def test_wheels_answer_a_control_torque_with_its_opposite(satellite, model):
     """Their torques, by weighted pseudo-inverse, and what that makes of their speeds."""
-    axes = np.asarray(satellite.cluster.R_PG0[:, :, 0])
-    R_BP = rotation(satellite.q_BP).as_matrix()
+    axes = np.asarray(satellite.clusters[0].units.R_PG0[:, :, 0])
+    R_BP = rotation(satellite.mounts[0].q_BX).as_matrix()
     rows = [model.states.index(f"rotor_speed_{j}") for j in range(4)]
     torque = (
-        np.asarray(satellite.cluster.I_RRcm_R[:, 0, 0])[:, None]
+        np.asarray(satellite.clusters[0].units.I_RRcm_R[:, 0, 0])[:, None]
         * model.select(["control_torque"]).B[rows]
     )
     np.testing.assert_allclose(R_BP @ axes.T @ torque, -np.eye(3), atol=1e-9)

@@ -8,21 +8,16 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from oracles.satellites import awkward_satellite, paper_satellite
+from oracles.satellites import awkward_satellite, paper_satellite, uncontrolled
 from quietbus.analysis.jitter.lines import steady_jitter
 from quietbus.dynamics.closed_loop import initial_state
-from quietbus.dynamics.equations import force, mass_matrix, plate_motion
-from quietbus.dynamics.kinematics import PlateMotion
+from quietbus.dynamics.coefficients import coefficients, slow_motion
+from quietbus.dynamics.equations import balance, mass_matrix
+from quietbus.dynamics.equations import moving as all_motions
 from quietbus.dynamics.linearize import OperatingPoint, linearize
-from quietbus.dynamics.vibration import (
-    Coefficients,
-    View,
-    body_coefficients,
-    leg_coefficients,
-    linear_outputs,
-    slow_motion,
-)
-from quietbus.model.cmg import ClusterMoments
+from quietbus.dynamics.views import View, linear_outputs
+from quietbus.model.moments import ClusterMoments, Turning
+from quietbus.model.motion import Motion
 from quietbus.spatial.rotation import rotation_vector_to_matrix
 from quietbus.spatial.vector import solve_small
 
@@ -31,75 +26,70 @@ from quietbus.spatial.vector import solve_small
 def moving():
     """An awkward satellite turning, its plate out of place, gimbals moving; seen along its bus."""
     satellite = awkward_satellite()
-    n = len(satellite.cluster.rotor_speed)
     rng = np.random.default_rng(7)
-    state = initial_state(
-        satellite, jnp.array([1.0, 0, 0, 0]), jnp.array(rng.normal(size=3)), jnp.zeros(n)
-    )
-    averaged = ClusterMoments.expand(satellite.cluster).averaged()
-    return satellite, slow_motion(satellite, jnp.zeros(()), state, averaged), averaged
+    start = jnp.array([1.0, 0, 0, 0]), jnp.array(rng.normal(size=3)), jnp.zeros(satellite.count)
+    state = initial_state(satellite, *start)
+    averaged = satellite.averaged()
+    return averaged, slow_motion(averaged, jnp.zeros(()), state)
 
 
-def moved(plates, way):
-    """The plates' motion changed by (r, theta_P, theta_B, v, w_P, w_B)."""
-    r, theta_P, theta_B, v, w_P, w_B = np.reshape(way, (6, 3))
-    turn = lambda theta, R: rotation_vector_to_matrix(jnp.array(theta)) @ R  # noqa: E731
-    return PlateMotion(
-        turn(theta_B, plates.R_NB),
-        turn(theta_P, plates.R_NP),
-        plates.p_BP + r,
-        plates.v_B,
-        plates.w_B + w_B,
-        plates.v_P + v,
-        plates.w_P + w_P,
-    )
+def moved(now, way):
+    """All motions changed by (r, theta, v, w) of every body."""
+    motions = {}
+    for (name, motion), part in zip(now.motions.items(), np.reshape(way, (-1, 4, 3)), strict=True):
+        r, theta, v, w = map(jnp.array, part)
+        R_AX = rotation_vector_to_matrix(theta) @ motion.R_AX
+        motions[name] = Motion(R_AX, motion.p + r, motion.v + v, motion.w + w)
+    return replace(now, motions=motions)
 
 
 def test_coefficients_are_the_derivatives_of_the_equations_of_motion(moving):
-    """Central differences of the whole force, loads apart, along all 18 ways."""
-    satellite, slow, averaged = moving
-    parts = leg_coefficients(satellite, slow), body_coefficients(satellite, slow, averaged)
-    found: Coefficients = jax.tree.map(jnp.add, *parts)
-    still = jnp.zeros_like(slow.gimbal[0])
-    carried = averaged.at(slow.gimbal[0], still, *slow.gimbal[1:])
-    total = jax.jit(lambda plates: force(satellite, plates, carried, slow.u_rate))
+    """Central differences of the whole force, along every displacement, turn and speed."""
+    averaged, slow = moving
+    layout, names = slow.now.layout, list(slow.now.motions)
+    each = coefficients(averaged.elements, slow)
+    shares = list(zip(averaged.elements, each, strict=True))
+    total = jax.jit(lambda now: balance(averaged, now, slow.rates, slow.u_rate))
     step = 1e-5
+    ways = np.eye(12 * len(names))
     columns = [
-        (total(moved(slow.plates, step * way)) - total(moved(slow.plates, -step * way)))
-        / (2 * step)
-        for way in np.eye(18)
+        (total(moved(slow.now, step * way)) - total(moved(slow.now, -step * way))) / (2 * step)
+        for way in ways
     ]
-    r, theta_P, theta_B, v, w_P, w_B = np.split(np.stack(columns, axis=1), 6, axis=1)
-    by_pose = np.concatenate([r, theta_P, -r, theta_B], axis=1)
-    by_speed = np.concatenate([v, w_P, -v, w_B], axis=1)
-    for value, expected in ((found.by_pose, by_pose), (found.by_speed, by_speed)):
-        assert np.max(np.abs(value - expected)) < 1e-7 * np.max(np.abs(expected))
-    M = mass_matrix(satellite, slow.plates, carried)
-    assert pytest.approx(np.asarray(M), rel=1e-12, abs=1e-12) == found.M
+    by_way = np.stack(columns, axis=1).reshape(layout.size, len(names), 2, 6)
+    order = [names.index(name) for name in layout.names]
+    for kind, expected in zip(("by_pose", "by_speed"), np.moveaxis(by_way, 2, 0), strict=True):
+        found = layout.matrix((e, getattr(c, kind)) for e, c in shares)
+        expected = expected[:, order].reshape(layout.size, -1)
+        assert np.max(np.abs(found - expected)) < 1e-7 * np.max(np.abs(expected))
+    M = mass_matrix(averaged, slow.now)
+    found = layout.matrix((e, c.M) for e, c in shares)
+    assert pytest.approx(np.asarray(M), rel=1e-12, abs=1e-12) == found
     # the slow motion obeys its equations
-    assert np.max(np.abs(found.force)) < 1e-9 * np.max(np.abs(M @ slow.u_rate))
+    left = layout.vector((e, c.force) for e, c in shares)
+    assert np.max(np.abs(left)) < 1e-9 * np.max(np.abs(M @ slow.u_rate))
 
 
 def test_force_at_accelerations_is_that_at_rest_less_mass_times_accelerations(moving):
     """Two ways to the inertia: velocities' accelerations, and the mass matrix."""
-    satellite, slow, averaged = moving
-    still = jnp.zeros_like(slow.gimbal[0])
-    carried = averaged.at(slow.gimbal[0], still, *slow.gimbal[1:])
-    a = jnp.array(np.random.default_rng(3).normal(size=12))
-    M = mass_matrix(satellite, slow.plates, carried)
-    none = force(satellite, slow.plates, carried, jnp.zeros(12))
-    with_a = force(satellite, slow.plates, carried, a)
+    averaged, slow = moving
+    a = jnp.array(np.random.default_rng(3).normal(size=slow.now.layout.size))
+    M = mass_matrix(averaged, slow.now)
+    none = balance(averaged, slow.now, slow.rates, jnp.zeros_like(a))
+    with_a = balance(averaged, slow.now, slow.rates, a)
     assert np.asarray(with_a) == pytest.approx(np.asarray(none - M @ a), rel=1e-10, abs=1e-9)
 
 
 def test_orders_are_the_fourier_coefficients_of_the_moments():
-    cluster = awkward_satellite().cluster
-    moments = ClusterMoments.expand(cluster)
-    n = len(cluster.rotor_speed)
+    units = awkward_satellite().clusters[0].units
+    moments = ClusterMoments.expand(units)
+    n = len(units.rotor_speed)
     rng = np.random.default_rng(5)
-    gamma, rate, acceleration, phi = (jnp.array(rng.normal(size=n)) for _ in range(4))
-    full = moments.at(gamma, phi, rate, acceleration)
-    orders = [moments.order(h, gamma, rate, acceleration) for h in (0, 1, 2)]
+    gimbal = Turning(*(jnp.array(rng.normal(size=n)) for _ in range(3)))
+    phi, spin_up = (jnp.array(rng.normal(size=n)) for _ in range(2))
+    rotor = Turning(phi, units.rotor_speed, spin_up)
+    full = moments.at(gimbal, rotor)
+    orders = [moments.order(h, gimbal, rotor) for h in (0, 1, 2)]
     for name in ("c", "J", "p", "H", "J_rate", "p_rate", "H_rate"):
         total = sum(
             np.einsum("j...,j->...", getattr(order, name), np.exp(1j * h * phi)).real
@@ -112,7 +102,7 @@ def test_orders_are_the_fourier_coefficients_of_the_moments():
 @pytest.mark.parametrize("angles", [[0, 0, 0, 0], [0.4, -0.9, 1.3, 0.2]])
 def test_modes_are_those_of_the_linear_analysis(angles):
     """Gimbals held: another set of coordinates and another derivation (dynamics.linearize)."""
-    satellite = replace(paper_satellite(), controller=None, steering=None)
+    satellite = uncontrolled(paper_satellite())
     small = jax.jit(lambda s, a: steady_jitter(s, a)[1])(satellite, jnp.array(angles, float))
     found = np.linalg.eigvals(jax.tree.map(np.asarray, small).state_matrix())
     model = linearize(satellite, OperatingPoint(np.zeros(3), np.array(angles, float)), "ideal")
@@ -142,22 +132,25 @@ def test_derivative_of_a_small_solution():
 
 
 def test_plate_motion_is_seen_along_the_bus(moving):
-    _, slow, _ = moving
-    inertial = plate_motion(slow.state)
-    assert np.asarray(slow.plates.R_NB) == pytest.approx(np.eye(3))
-    assert np.asarray(inertial.R_NB @ slow.plates.p_BP) == pytest.approx(np.asarray(inertial.p_BP))
+    averaged, slow = moving
+    inertial = all_motions(averaged, jnp.zeros(()), slow.state).motions
+    arm = np.asarray(inertial["plate"].p - inertial["bus"].p)
+    assert np.asarray(slow.now.motions["bus"].R_AX) == pytest.approx(np.eye(3))
+    assert np.asarray(inertial["bus"].R_AX @ slow.now.motions["plate"].p) == pytest.approx(arm)
 
 
 def test_each_motion_moves_the_image_by_its_own_column(moving):
     """Satellite as one body: the bus's six columns alone. Plate alone: the plate's six alone."""
-    satellite, slow, _ = moving
-    small = SimpleNamespace(slow=slow, turning=jnp.zeros((3, 3)))
+    averaged, slow = moving
+    small = SimpleNamespace(slow=slow, turning=jnp.zeros((3, 3)), seen={})
+    small.projection, small.speed = np.eye(12), np.zeros((12, 12))
     view = View(jnp.zeros((0, 3)), jnp.eye(12).reshape(4, 3, 12))
-    see = lambda xi: linear_outputs(satellite, small, 1j, jnp.array(xi), view)  # noqa: E731
+    see = lambda xi: linear_outputs(averaged, small, 1j, jnp.array(xi), view)  # noqa: E731
     r, theta = np.random.default_rng(3).normal(size=(2, 3)) + 0j
-    as_one = np.concatenate([r + np.cross(theta, slow.plates.p_BP), theta, r, theta])
+    arm = slow.now.motions["plate"].p
+    as_one = np.concatenate([r, theta, r + np.cross(theta, arm), theta])
     expected = np.concatenate([theta, r, np.zeros(6)])
     assert np.max(np.abs(see(as_one)["line_of_sight"].ravel() - expected)) < 1e-12
-    plate = np.concatenate([r, theta, np.zeros(6)])
+    plate = np.concatenate([np.zeros(6), r, theta])
     expected = np.concatenate([np.zeros(6), theta, r])
     assert np.max(np.abs(see(plate)["line_of_sight"].ravel() - expected)) < 1e-12

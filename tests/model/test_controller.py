@@ -8,8 +8,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from quietbus.build import build_initial_state, build_satellite
-from quietbus.dynamics.closed_loop import control_signals
-from quietbus.model.controller import GimbalServo, PIDController
+from quietbus.dynamics.closed_loop import decide
+from quietbus.model.controller import Measured, PIDController
+from quietbus.model.gimbals import GimbalServos
 from quietbus.scenario import load_scenario
 from quietbus.spatial.rotation import rotation_vector_to_quaternion
 
@@ -18,7 +19,7 @@ UNWINDING = 1.0 / np.sqrt(KI * KD)
 
 
 def controller(torque_limit=None, unwinding=UNWINDING, J=None):
-    limit = None if torque_limit is None else jnp.asarray(torque_limit)
+    limit = jnp.asarray(np.inf if torque_limit is None else torque_limit)
     J = jnp.zeros((3, 3)) if J is None else J
     return PIDController(*map(jnp.asarray, (KP, KI, KD)), J, jnp.asarray(unwinding), limit)
 
@@ -28,7 +29,8 @@ def test_torque_is_minus_pid_plus_inertia_times_reference_acceleration():
     e, q, w, dw = rng.normal(size=(4, 3))
     J = rng.normal(size=(3, 3))
     expected = -(KP * e + KI * q + KD * w) + J @ dw
-    np.testing.assert_allclose(controller(J=J).torque_B(e, q, w, dw), expected, rtol=1e-12)
+    found = controller(J=J).torque_B(Measured(e, w, dw), q)
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
 @pytest.fixture(scope="module")
@@ -37,12 +39,12 @@ def signals_of():
     scenario = load_scenario("zhang2012")
     satellite = build_satellite(scenario)
     state = build_initial_state(scenario, satellite)
-    signals = eqx.filter_jit(control_signals)
+    signals = eqx.filter_jit(decide)
 
     def at(turn, rate=(0.0, 0.0, 0.0), target=(1.0, 0.0, 0.0, 0.0), sign=1.0):
-        aimed = eqx.tree_at(lambda s: s.guidance.q_NR, satellite, jnp.asarray(target))
+        aimed = eqx.tree_at(lambda s: s.control.guidance.q_NR, satellite, jnp.asarray(target))
         q_NB = sign * rotation_vector_to_quaternion(jnp.asarray(turn))
-        moved = eqx.tree_at(lambda s: (s.q_NB, s.w_NB_B), state, (q_NB, jnp.asarray(rate)))
+        moved = eqx.tree_at(lambda s: (s.bus.q_NX, s.bus.w_NX_X), state, (q_NB, jnp.asarray(rate)))
         return signals(aimed, jnp.zeros(()), moved)
 
     return at
@@ -71,19 +73,21 @@ def test_torque_follows_a_slew_in_the_bus_frame():
     satellite = build_satellite(scenario)
     state = build_initial_state(scenario, satellite)
     J = np.array([[900.0, 20.0, -10.0], [20.0, 1000.0, 30.0], [-10.0, 30.0, 1100.0]])
-    satellite = eqx.tree_at(lambda s: s.controller.J_feedforward_B, satellite, jnp.asarray(J))
-    t = jnp.float64(satellite.guidance.start[0] + 0.5 * satellite.guidance.duration[0])
-    reference = satellite.guidance.reference(t)
+    where = lambda s: s.control.controller.J_feedforward_B  # noqa: E731
+    satellite = eqx.tree_at(where, satellite, jnp.asarray(J))
+    guidance = satellite.control.guidance
+    t = jnp.float64(guidance.start[0] + 0.5 * guidance.duration[0])
+    reference = guidance.reference(t)
     assert np.linalg.norm(reference.w_NR_R) > 1e-6
     assert np.linalg.norm(reference.dw_NR_R) > 1e-6
 
     turn, w = Rotation.from_rotvec([0.7, -0.4, 1.1]), np.array([0.01, 0.03, -0.02])
     R_NB = Rotation.from_quat(np.roll(reference.q_NR, -1)) * turn
     q_NB = jnp.asarray(np.roll(R_NB.as_quat(), 1))
-    state = eqx.tree_at(lambda s: (s.q_NB, s.w_NB_B), state, (q_NB, jnp.asarray(w)))
-    found = eqx.filter_jit(control_signals)(satellite, t, state).torque_B
+    state = eqx.tree_at(lambda s: (s.bus.q_NX, s.bus.w_NX_X), state, (q_NB, jnp.asarray(w)))
+    found = eqx.filter_jit(decide)(satellite, t, state).torque_B
 
-    kp, kd = float(satellite.controller.kp), float(satellite.controller.kd)
+    kp, kd = float(satellite.control.controller.kp), float(satellite.control.controller.kd)
     e = 2.0 * turn.as_quat()[:3]
     in_B = turn.inv().apply(np.stack([reference.w_NR_R, reference.dw_NR_R]))
     expected = J @ in_B[1] - kp * e - kd * (w - in_B[0])
@@ -104,10 +108,12 @@ def step_response(pid, J=500.0, duration=120.0, dt=0.01):
 
     def step(carry, _):
         e, w, q = carry
-        asked = pid.torque_B(e, q, w, jnp.zeros(3))
+        measured = Measured(e, w, jnp.zeros(3))
+        asked = pid.torque_B(measured, q)
         delivered = pid.limited(asked)
         w = w + dt * delivered / J
-        return (e + dt * w, w, q + dt * pid.integral_rate(e, asked, delivered)), (e[0], q[0])
+        q_rate = pid.memory_rate(measured, q, asked, delivered)
+        return (e + dt * w, w, q + dt * q_rate), (e[0], q[0])
 
     start = (jnp.array([1.0, 0.0, 0.0]), jnp.zeros(3), jnp.zeros(3))
     return jax.jit(lambda: jax.lax.scan(step, start, None, int(duration / dt))[1])()
@@ -115,7 +121,8 @@ def step_response(pid, J=500.0, duration=120.0, dt=0.01):
 
 def test_integral_is_that_of_the_error_where_nothing_saturates():
     e, T = jnp.array([0.1, -0.2, 0.3]), jnp.array([1.0, 2.0, 3.0])
-    np.testing.assert_array_equal(controller().integral_rate(e, T, T), e)
+    measured = Measured(e, jnp.zeros(3), jnp.zeros(3))
+    np.testing.assert_array_equal(controller().memory_rate(measured, jnp.zeros(3), T, T), e)
 
 
 def test_back_calculation_stops_windup():
@@ -135,8 +142,8 @@ def test_back_calculation_stops_windup():
 
 
 def servo(rate_limit=None, acceleration_limit=None):
-    optional = (None if v is None else jnp.asarray(v) for v in (rate_limit, acceleration_limit))
-    return GimbalServo(jnp.asarray(50.0), *optional)
+    limits = (np.inf if v is None else v for v in (rate_limit, acceleration_limit))
+    return GimbalServos(jnp.asarray(50.0), *map(jnp.asarray, limits))
 
 
 def test_servo_answers_a_step_by_a_first_order_lag():
@@ -144,8 +151,8 @@ def test_servo_answers_a_step_by_a_first_order_lag():
     command, dt = np.array([1.0, -0.4]), 1e-4
     rates = [np.zeros(2)]
     for _ in range(400):
-        middle = rates[-1] + 0.5 * dt * servo().acceleration(command, rates[-1])
-        rates.append(rates[-1] + dt * np.asarray(servo().acceleration(command, middle)))
+        middle = rates[-1] + 0.5 * dt * servo().acceleration(rates[-1], command)
+        rates.append(rates[-1] + dt * np.asarray(servo().acceleration(middle, command)))
     t = dt * np.arange(401)
     np.testing.assert_allclose(rates, np.outer(1.0 - np.exp(-50.0 * t), command), atol=2e-6)
 
@@ -161,9 +168,9 @@ def test_rates_are_cut_alike_by_the_rate_limit():
 
 def test_acceleration_limit_holds_for_each_gimbal():
     command, rate = np.array([0.5, -4.0, 1.0]), np.array([0.4, 0.0, 1.0])
-    found = servo(acceleration_limit=10.0).acceleration(command, rate)
+    found = servo(acceleration_limit=10.0).acceleration(rate, command)
     np.testing.assert_allclose(found, [5.0, -10.0, 0.0], atol=1e-12)
-    np.testing.assert_allclose(servo().acceleration(command, rate), 50.0 * (command - rate))
+    np.testing.assert_allclose(servo().acceleration(rate, command), 50.0 * (command - rate))
 
 
 def test_cut_rates_are_what_the_integrator_knows_of():
@@ -173,12 +180,12 @@ def test_cut_rates_are_what_the_integrator_knows_of():
     )
     satellite = build_satellite(scenario)
     state = build_initial_state(scenario, satellite)
-    signals = eqx.filter_jit(control_signals)(satellite, jnp.zeros(()), state)
-    e = signals.attitude_error_B
+    signals = eqx.filter_jit(decide)(satellite, jnp.zeros(()), state)
+    e = signals.error_B
     asked = -200.0 * e
     np.testing.assert_allclose(signals.torque_B, 3.0 * asked / np.linalg.norm(asked), rtol=1e-12)
-    assert np.abs(signals.gimbal_rate_command).max() == pytest.approx(1e-3, rel=1e-12)
-    lost = (signals.integral_rate - e) * np.sqrt(0.1 * 2500.0)  # asked - delivered
+    assert np.abs(signals.commands[0]).max() == pytest.approx(1e-3, rel=1e-12)
+    lost = (signals.memory_rate - e) * np.sqrt(0.1 * 2500.0)  # asked - delivered
     delivered = asked - lost
     assert 0.0 < np.linalg.norm(delivered) < 0.5 * 3.0
     np.testing.assert_allclose(np.cross(delivered, asked), np.zeros(3), atol=1e-9)

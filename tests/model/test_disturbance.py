@@ -1,7 +1,5 @@
 """Orders, bearing modes and noise of the rotors against hand-made rotations and state matrices."""
 
-from dataclasses import replace
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -10,8 +8,8 @@ from scipy.interpolate import make_interp_spline
 from scipy.signal import welch
 from scipy.spatial.transform import Rotation
 
-from oracles.satellites import awkward_satellite, paper_satellite
-from quietbus.model.disturbance import Disturbance, Noise, Spectrum, on_plate
+from oracles.satellites import awkward_satellite, paper_satellite, with_cluster
+from quietbus.model.disturbance import Disturbance, Noise, Spectrum, on_carrier
 from quietbus.solve.noise import with_noise
 
 SILENT = ((None,) * 4,) * 4
@@ -21,8 +19,7 @@ SPIN, ACROSS = 15.0 / (200 * np.pi), 9.0 / (200 * np.pi)  # [kg m^2] of the pape
 def disturbance(order=(1.0, 2.0, 2.83), period=(0.0, 0.0, 0.0), damping=(0.02,) * 3, **changes):
     shape = (4, len(order), 6)
     fields = {
-        "order": jnp.array(order),
-        "imbalance_at": (0, 1),
+        "orders": order,
         "coefficient": jnp.zeros(shape),
         "phase": jnp.zeros(shape),
         "period": jnp.tile(jnp.array(period), (4, 1)),
@@ -34,7 +31,7 @@ def disturbance(order=(1.0, 2.0, 2.83), period=(0.0, 0.0, 0.0), damping=(0.02,) 
 
 def test_wrench_on_the_plate_is_that_of_vectors_turned_by_hand():
     """Every channel, tilted bearings, rotor centres off the axis, rotors turning both ways."""
-    cluster = awkward_satellite().cluster
+    cluster = awkward_satellite().clusters[0].units
     rng = np.random.default_rng(4)
     coefficient, phase = rng.uniform(0.5, 1, (2, 4, 3, 6)) * 1e-6
     phase = 1e6 * phase
@@ -44,7 +41,7 @@ def test_wrench_on_the_plate_is_that_of_vectors_turned_by_hand():
     @jax.jit
     def push(gamma, phi):
         each = shaking.wrench(cluster, jnp.zeros(()), phi, cluster.rotor_speed)
-        return on_plate(cluster, gamma, each[:, None])[:, 0]
+        return on_carrier(cluster, gamma, each[:, None])[:, 0]
 
     found = np.asarray(push(gamma, phi))
     for j in range(4):
@@ -92,7 +89,7 @@ def rocking():
 def test_rocking_is_the_response_of_the_four_state_matrix(rocking):
     zeta, natural, _, A, B, C = rocking
     shaking = disturbance(period=(0, 0, 1 / natural), damping=(1, 1, zeta))
-    cluster = paper_satellite().cluster
+    cluster = paper_satellite().clusters[0].units
     omega = np.linspace(-700.0, 1500.0, 12)
     found = shaking.transmission(
         cluster, cluster.rotor_speed, jnp.tile(jnp.array(omega)[:, None], (1, 4))
@@ -114,7 +111,7 @@ def test_whirl_frequencies_are_the_eigenvalues_and_the_published_split(rocking):
     assert np.sort(np.abs(eigenvalues)) == pytest.approx(np.sort(np.tile(split, 2)))
     # the transmission is largest there: backward at the lower one, forward at the higher one
     shaking = disturbance(period=(0, 0, 1 / natural), damping=(1, 1, 1e-4))
-    cluster = paper_satellite().cluster
+    cluster = paper_satellite().clusters[0].units
     at = np.linspace(1.0, 1.5 * split[1], 200_001)
     passed = shaking.transmission(
         cluster, cluster.rotor_speed, jnp.tile(jnp.array(at)[:, None], (1, 4))
@@ -127,7 +124,7 @@ def test_whirl_frequencies_are_the_eigenvalues_and_the_published_split(rocking):
 def test_translation_is_the_second_order_form_of_the_books():
     """Zhang and Xu (2012), eq. 2: at sqrt(2) of the resonance all pass 1, whatever the damping."""
     shaking = disturbance(period=(1 / 300.0, 1 / 500.0, 0), damping=(0.1, 0.5, 0.02))
-    cluster = paper_satellite().cluster
+    cluster = paper_satellite().clusters[0].units
     omega = 300.0 * np.array([0.5, 1.0, np.sqrt(2.0), 3.0])
     passed = np.asarray(
         shaking.transmission(cluster, cluster.rotor_speed, jnp.outer(jnp.array(omega), jnp.ones(4)))
@@ -169,12 +166,11 @@ def test_a_realisation_has_the_spectra_of_its_tables():
     """Welch's estimate, and the whole mean square; resonances shape it; seeds tell apart."""
     table = Spectrum(jnp.array([5.0, 50.0]), jnp.array([2.0, 0.5]), False)
     of_each = ((table, None, None, table),) * 4
-    satellite = replace(
-        paper_satellite(), disturbance=disturbance(broadband=of_each, period=(1 / 200.0, 0, 0))
-    )
+    shaken = disturbance(broadband=of_each, period=(1 / 200.0, 0, 0))
+    satellite = with_cluster(paper_satellite(), disturbance=shaken)
     first, again = (with_noise(satellite, seeds, 40.0) for seeds in ((1, 2, 3, 4), (1, 2, 3, 5)))
     t = np.arange(40 * 400) / 400.0
-    noise = first.disturbance.noise
+    noise = first.clusters[0].disturbance.noise
     signal = np.asarray(jnp.stack([noise.at(u) for u in t[:3]]))
     samples = np.fft.fft(np.asarray(noise.coefficients), axis=0)  # evaluated fast, at the knots
     n = len(samples)
@@ -199,13 +195,15 @@ def test_a_realisation_has_the_spectra_of_its_tables():
     assert abs(across) < 0.2  # independent
     square = np.mean(knots[:, :, 3] ** 2, axis=0)
     assert square == pytest.approx(0.5 * (2.0 + 0.5) * 45.0, rel=1e-2)  # area of the table
-    same = np.all(np.asarray(noise.coefficients == again.disturbance.noise.coefficients), (0, 2))
+    same = np.all(
+        np.asarray(noise.coefficients == again.clusters[0].disturbance.noise.coefficients), (0, 2)
+    )
     assert list(same) == [True, True, True, False]
 
 
 def test_noise_without_a_realisation_is_refused():
     table = Spectrum(jnp.array([5.0, 50.0]), jnp.array([2.0, 0.5]), False)
     noisy = disturbance(broadband=((table, None, None, None),) * 4)
-    cluster = paper_satellite().cluster
+    cluster = paper_satellite().clusters[0].units
     with pytest.raises(ValueError, match="needs a realisation"):
         noisy.wrench(cluster, jnp.zeros(()), jnp.zeros(4), cluster.rotor_speed)

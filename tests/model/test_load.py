@@ -5,7 +5,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from quietbus.model.element import NOTHING, Around, Rates
 from quietbus.model.load import Constant, HalfSine, Load, Step, Table
+from quietbus.model.motion import Motion
 
 T = np.array([-1.0, 0.0, 0.999, 1.0, 1.5, 1.75, 2.0, 2.999, 3.0, 10.0])
 PROFILES = {
@@ -32,6 +34,14 @@ R_NX = Rotation.from_rotvec([0.5, -1.0, 0.7]).as_matrix()
 FORCE, TORQUE, POINT = np.array([[1.0, -2.0, 3.0], [0.5, 0.4, -0.3], [0.2, 0.1, -0.6]])
 
 
+def pushed(load, t):
+    """Force and torque about the origin, inertial axes, on a body that moves somehow."""
+    body = Motion(jnp.asarray(R_NX), *jnp.asarray(np.random.default_rng(0).normal(size=(3, 3))))
+    around = Around(jnp.asarray(t), jnp.eye(3), (body,), NOTHING)
+    nothing = Rates(jnp.zeros(0), jnp.zeros(0))
+    return np.asarray(load.balance(around, nothing, jnp.zeros(6))).reshape(2, 3)
+
+
 @pytest.mark.parametrize("name", PROFILES)
 def test_profile_has_its_closed_form_and_names_its_corners(name):
     profile, expected, corners = PROFILES[name]
@@ -42,10 +52,9 @@ def test_profile_has_its_closed_form_and_names_its_corners(name):
 
 @pytest.mark.parametrize("frame", ["body", "inertial"])
 def test_wrench_turns_with_the_body_only_in_the_body_frame_but_its_point_always_does(frame):
-    load = Load(
-        "bus", frame, FORCE, TORQUE, POINT, Table(jnp.array([0.0, 1.0]), jnp.array([0, 2.0]))
-    )
-    force, torque = load.wrench(jnp.asarray(0.75), R_NX)
+    ramp = Table(jnp.array([0.0, 1.0]), jnp.array([0, 2.0]))
+    load = Load("push", ("bus",), frame, FORCE, TORQUE, POINT, ramp)
+    force, torque = pushed(load, 0.75)
     turn = R_NX if frame == "body" else np.eye(3)
     F, arm = 1.5 * turn @ FORCE, R_NX @ POINT
     np.testing.assert_allclose(force, F, atol=1e-14)
@@ -53,8 +62,8 @@ def test_wrench_turns_with_the_body_only_in_the_body_frame_but_its_point_always_
 
 
 def test_torque_about_the_origin_has_the_power_of_the_force_at_its_point():
-    load = Load("plate", "inertial", FORCE, np.zeros(3), POINT, Constant())
-    force, torque = load.wrench(jnp.zeros(()), R_NX)
+    load = Load("push", ("plate",), "inertial", FORCE, np.zeros(3), POINT, Constant())
+    force, torque = pushed(load, 0.0)
     v, w = np.array([0.3, -0.1, 0.2]), np.array([-0.4, 0.9, 0.6])
     power = force @ v + torque @ w
     assert float(power) == pytest.approx(FORCE @ (v + np.cross(w, R_NX @ POINT)), rel=1e-13)

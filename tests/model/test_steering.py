@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 from quietbus.build import build_initial_state, build_satellite
-from quietbus.dynamics.closed_loop import control_signals
-from quietbus.model.cmg import momentum_P
+from quietbus.dynamics.closed_loop import decide
 from quietbus.model.steering import (
     GeneralizedSingularityRobust,
     PseudoInverse,
     SingularityRobust,
     singularity_measure,
 )
+from quietbus.model.unit import momentum_P
 from quietbus.scenario import load_scenario
 from quietbus.spatial.rotation import quaternion_to_matrix, rotation_vector_to_quaternion
 
@@ -64,9 +64,7 @@ def test_singularity_measure_of_a_pyramid_at_zero_gimbal_angles(count):
         0.5 * count**1.5 * np.sin(SKEW) * np.cos(SKEW) ** 2, rel=1e-12
     )
     built = build_satellite(load_scenario("zhang2012"))
-    signals = control_signals(
-        built, jnp.zeros(()), build_initial_state(load_scenario("zhang2012"), built)
-    )
+    signals = decide(built, jnp.zeros(()), build_initial_state(load_scenario("zhang2012"), built))
     assert float(signals.singularity) == pytest.approx(
         4.0 * np.sin(SKEW) * np.cos(SKEW) ** 2, rel=1e-12
     )
@@ -175,18 +173,19 @@ def test_commanded_gimbal_rates_give_the_bus_the_torque_of_the_controller(seed):
         {"control.steering": {"law": "pseudo_inverse"}}
     )
     satellite = build_satellite(scenario)
-    speed = satellite.cluster.rotor_speed * jnp.array([1.0, -0.9, 1.1, 0.8])
+    speed = satellite.clusters[0].units.rotor_speed * jnp.array([1.0, -0.9, 1.1, 0.8])
     q_BP = rotation_vector_to_quaternion(jnp.asarray(rng.normal(size=3)))
-    satellite = eqx.tree_at(lambda s: (s.cluster.rotor_speed, s.q_BP), satellite, (speed, q_BP))
+    where = lambda s: (s.clusters[0].units.rotor_speed, s.mounts[0].q_BX)  # noqa: E731
+    satellite = eqx.tree_at(where, satellite, (speed, q_BP))
     state = build_initial_state(scenario, satellite)
     gamma = jnp.asarray(rng.uniform(-0.5, 0.5, 4))
-    state = eqx.tree_at(lambda s: s.gimbal_angle, state, gamma)
-    signals = control_signals(satellite, jnp.zeros(()), state)
+    state = eqx.tree_at(lambda s: s.own["cluster"].y, state, gamma)
+    signals = decide(satellite, jnp.zeros(()), state)
 
     def momentum_B(gamma):
-        h_P = jnp.sum(momentum_P(satellite.cluster, gamma), axis=0)
+        h_P = jnp.sum(momentum_P(satellite.clusters[0].units, gamma), axis=0)
         return quaternion_to_matrix(q_BP) @ h_P
 
-    _, rate = jax.jvp(momentum_B, (gamma,), (signals.gimbal_rate_command,))
+    _, rate = jax.jvp(momentum_B, (gamma,), (signals.commands[0],))
     assert np.linalg.norm(signals.torque_B) > 5.0
     np.testing.assert_allclose(-rate, signals.torque_B, atol=1e-10)

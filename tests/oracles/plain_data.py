@@ -117,7 +117,7 @@ def satellite(heavy: bool = True) -> dict[str, Any]:
     south = {
         "name": "south",
         "isolator": isolator([-0.2, 1.1, 0.5], [-0.3, 0.1, 0.0], heavy),
-        "cluster": wheels([[1.0, 0.3, 0.0], [0.0, 1.0, 0.2]]),
+        "cluster": wheels([[1.0, 0.3, 0.0], [0.0, 1.0, 0.2]], motor={"torque_limit": 0.5}),
     }
     payload = {
         "body": {

@@ -6,14 +6,24 @@ from typing import Literal
 import jax.numpy as jnp
 import numpy as np
 
-from quietbus.model.body import Bus, Plate
-from quietbus.model.cmg import ControlMomentGyro
-from quietbus.model.controller import GimbalServo, PIDController
+from quietbus.model.body import Body
+from quietbus.model.body import Mount as Mounted
+from quietbus.model.cluster import Cluster
+from quietbus.model.control import Control
+from quietbus.model.controller import NoController, PIDController
+from quietbus.model.disturbance import quiet_rotors
+from quietbus.model.element import AbstractElement
+from quietbus.model.gimbal_motor import SmoothMotor
+from quietbus.model.gimbals import GimbalServos, HeldGimbals
 from quietbus.model.guidance import StepGuidance
-from quietbus.model.hexapod import Hexapod, LegParts
-from quietbus.model.rotor import RunUp, WheelMotors
+from quietbus.model.legs.hexapod import Hexapod
+from quietbus.model.legs.inertia import LegBodies, LegParts
+from quietbus.model.legs.kinematics import Geometry
+from quietbus.model.rotors import ConstantSpeed, RunUp, WheelMotors
 from quietbus.model.satellite import Satellite
-from quietbus.model.steering import PseudoInverse, SingularityRobust
+from quietbus.model.steering import NoSteering, PseudoInverse, SingularityRobust
+from quietbus.model.struts import SpringDamper
+from quietbus.model.unit import ControlMomentGyro
 from quietbus.spatial.rotation import (
     quaternion_to_matrix,
     rotation_vector_to_matrix,
@@ -25,27 +35,59 @@ Mount = Literal["isolated", "rigid"]
 
 def paper_satellite(mount: Mount = "isolated", imbalance: float = 1.0) -> Satellite:
     """The satellite of Zhang and Xu (2012), controlled; imbalance in units of the paper's."""
-    return Satellite(
-        bus=Bus(_array(1000.0), _array([[1100, -20, -10], [-20, 900, -15], [-10, -15, 800]])),
-        plate=Plate(_array(6.8), jnp.zeros(3), jnp.diag(_array([1.78, 1.78, 1.3]))),
-        legs=_legs(),
-        cluster=_cluster(imbalance),
-        p_BP_B=_array([0.0, 0.0, 0.6 + 0.25 * np.sqrt(2.0)]),
-        q_BP=_array([1.0, 0.0, 0.0, 0.0]),
-        servo=GimbalServo(_array(50.0), None, None),
-        guidance=StepGuidance(_array([1.0, 0.0, 0.0, 0.0])),
-        controller=PIDController(
-            kp=_array(200.0),
-            ki=_array(0.1),
-            kd=_array(2500.0),
-            J_feedforward_B=jnp.zeros((3, 3)),
-            unwinding=_array(1.0 / (0.1 * np.sqrt(2500.0 / 0.1))),
-            torque_limit=None,
-        ),
-        steering=SingularityRobust(_array(0.01), _array(10.0)),
-        loads=(),
-        mount=mount,
+    inertia = _array([[1100, -20, -10], [-20, 900, -15], [-10, -15, 800]])
+    welded = mount == "rigid"
+    p_BP_B = _array([0.0, 0.0, 0.6 + 0.25 * np.sqrt(2.0)])
+    still = _array([1.0, 0.0, 0.0, 0.0])
+    controller = PIDController(
+        kp=_array(200.0),
+        ki=_array(0.1),
+        kd=_array(2500.0),
+        J_feedforward_B=jnp.zeros((3, 3)),
+        unwinding=_array(1.0 / (0.1 * np.sqrt(2500.0 / 0.1))),
+        torque_limit=_array(np.inf),
     )
+    steering = SingularityRobust(_array(0.01), _array(10.0))
+    return Satellite(
+        bodies=(
+            Body("bus", _array(1000.0), jnp.zeros(3), inertia),
+            Body("plate", _array(6.8), jnp.zeros(3), jnp.diag(_array([1.78, 1.78, 1.3]))),
+        ),
+        mounts=(Mounted("plate", "bus", p_BP_B, still, welded),),
+        hexapods=(_legs(not welded),),
+        clusters=(_cluster(imbalance),),
+        others=(),
+        control=Control(StepGuidance(still), controller, steering, ("cluster",)),
+    )
+
+
+def uncontrolled(satellite: Satellite, *others: AbstractElement) -> Satellite:
+    """The satellite without control, its gimbals keeping their rates, with further parts."""
+    control = replace(satellite.control, controller=NoController(), steering=NoSteering())
+    clusters = tuple(replace(c, gimbals=_coasting(c.gimbals)) for c in satellite.clusters)
+    return replace(satellite, control=control, clusters=clusters, others=others)
+
+
+def _coasting(gimbals):
+    return replace(gimbals, bandwidth=jnp.zeros(())) if hasattr(gimbals, "bandwidth") else gimbals
+
+
+def with_units(satellite: Satellite, **changes: object) -> Satellite:
+    """The satellite with other numbers of its units."""
+    (cluster,) = satellite.clusters
+    units = replace(cluster.units, **changes)
+    return replace(satellite, clusters=(replace(cluster, units=units),))
+
+
+def with_cluster(satellite: Satellite, **changes: object) -> Satellite:
+    """The satellite with other parts of its cluster: gimbals, rotors, disturbance, motor."""
+    (cluster,) = satellite.clusters
+    return replace(satellite, clusters=(replace(cluster, **changes),))
+
+
+def with_control(satellite: Satellite, **changes: object) -> Satellite:
+    """The satellite with another guidance, controller or steering."""
+    return replace(satellite, control=replace(satellite.control, **changes))
 
 
 def awkward_satellite(mount: Mount = "isolated", imbalance: float = 1.0) -> Satellite:
@@ -56,60 +98,72 @@ def awkward_satellite(mount: Mount = "isolated", imbalance: float = 1.0) -> Sate
     """
     rng = np.random.default_rng(2012)
     satellite = paper_satellite(mount, imbalance)
-    legs, cluster = satellite.legs, satellite.cluster
+    (legs,), (cluster,), (mount_,) = satellite.hexapods, satellite.clusters, satellite.mounts
+    joints, units = legs.geometry, cluster.units
 
     def each(low: float, high: float) -> jnp.ndarray:
         return _array(rng.uniform(low, high, 6))
 
     q_BP = rotation_vector_to_quaternion(_array([0.1, -0.15, 0.4]))
-    p_BU_B = satellite.p_BP_B + legs.p_PU_P @ quaternion_to_matrix(q_BP).T
-    length = jnp.linalg.norm(p_BU_B - legs.p_BA_B, axis=1)
-    k_B = legs.k_B + _array(rng.normal(size=(6, 3), scale=0.3))
+    p_BU_B = mount_.p_BX_B + joints.p_PU_P @ quaternion_to_matrix(q_BP).T
+    length = jnp.linalg.norm(p_BU_B - joints.p_BA_B, axis=1)
+    k_B = joints.k_B + _array(rng.normal(size=(6, 3), scale=0.3))
+    k_B = k_B / jnp.linalg.norm(k_B, axis=1, keepdims=True)
+    strut = SpringDamper(each(1e4, 3e4), each(200.0, 800.0), 0.98 * length)
+    upper = LegParts(each(1, 2), each(0.1, 0.2), each(0.01, 0.02), each(0.001, 0.004))
+    lower = LegParts(each(2, 4), each(0.1, 0.2), each(0.02, 0.04), each(0.001, 0.004))
     legs = replace(
         legs,
-        k_B=k_B / jnp.linalg.norm(k_B, axis=1, keepdims=True),
-        stiffness=each(1e4, 3e4),
-        damping=each(200.0, 800.0),
-        free_length=0.98 * length,
-        nominal_length=length,
-        upper=LegParts(each(1, 2), each(0.1, 0.2), each(0.01, 0.02), each(0.001, 0.004)),
-        lower=LegParts(each(2, 4), each(0.1, 0.2), each(0.02, 0.04), each(0.001, 0.004)),
-        spherical_friction=each(0.5, 3.0),
-        universal_friction=each(0.5, 3.0),
+        geometry=replace(joints, k_B=k_B, nominal_length=length),
+        bodies=LegBodies(upper, lower, each(0.5, 3.0), each(0.5, 3.0)),
+        strut=strut,
     )
     products = np.array([[0.0, 0.01, 0.005], [0.01, 0.0, -0.007], [0.005, -0.007, 0.01]])
     tilts = [rotation_vector_to_matrix(_array(rng.normal(size=3, scale=0.05))) for _ in range(4)]
-    cluster = replace(
-        cluster,
+    units = replace(
+        units,
         R_GF=jnp.stack(tilts),
-        I_GGcm_G=cluster.I_GGcm_G + products,
+        I_GGcm_G=units.I_GGcm_G + products,
         p_CGcm_G=_array(rng.normal(size=(4, 3), scale=0.02)),
         p_CR_G=_array(rng.normal(size=(4, 3), scale=0.02)),
-        rotor_speed=cluster.rotor_speed * _array([1.0, -0.9, 1.1, 0.95]),
+        rotor_speed=units.rotor_speed * _array([1.0, -0.9, 1.1, 0.95]),
     )
-    plate = Plate(satellite.plate.mass, _array([0.01, -0.02, 0.03]), satellite.plate.I_PPcm_P + 0.1)
-    return replace(satellite, legs=legs, cluster=cluster, plate=plate, q_BP=q_BP)
+    bus, plate = satellite.bodies
+    plate = replace(plate, p_XXcm_X=_array([0.01, -0.02, 0.03]), I_XXcm_X=plate.I_XXcm_X + 0.1)
+    return replace(
+        satellite,
+        bodies=(bus, plate),
+        mounts=(replace(mount_, q_BX=q_BP),),
+        hexapods=(legs,),
+        clusters=(replace(cluster, units=units),),
+    )
 
 
 def with_wheels(satellite: Satellite) -> Satellite:
     """The satellite with reaction wheels, spinning about what were the gimbal axes, unlike fast."""
     speed = _array([90.0, -110.0, 70.0, 0.0])
-    R_PG0 = jnp.roll(satellite.cluster.R_PG0, 1, axis=2)
-    wheels = WheelMotors(None, None)
-    cluster = replace(satellite.cluster, drive=wheels, rotor_speed=speed, R_PG0=R_PG0)
-    servo = GimbalServo(_array(0.0), None, None)
-    return replace(satellite, cluster=cluster, servo=servo, steering=PseudoInverse())
+    (cluster,) = satellite.clusters
+    units = replace(
+        cluster.units, rotor_speed=speed, R_PG0=jnp.roll(cluster.units.R_PG0, 1, axis=2)
+    )
+    unlimited = jnp.full(4, jnp.inf)
+    wheels = replace(
+        cluster,
+        units=units,
+        gimbals=HeldGimbals(jnp.zeros(4)),
+        rotors=WheelMotors(unlimited, unlimited),
+    )
+    return with_control(replace(satellite, clusters=(wheels,)), steering=PseudoInverse())
 
 
 def with_run_up(satellite: Satellite, shape: Literal["smooth", "linear"] = "linear") -> Satellite:
     """The satellite with its rotors running up, down, through rest and not at all."""
     initial, final = _array([0.0, 100.0, -60.0, 80.0]), _array([150.0, 40.0, 60.0, 80.0])
     one = jnp.ones(4)
-    drive = RunUp(initial, final, 0.0 * one, 1.5 * one, shape)
-    return replace(satellite, cluster=replace(satellite.cluster, drive=drive))
+    return with_cluster(satellite, rotors=RunUp(initial, final, 0.0 * one, 1.5 * one, shape))
 
 
-def _legs() -> Hexapod:
+def _legs(holds: bool) -> Hexapod:
     root3 = np.sqrt(3.0)
     upper = [[0.5, 0, 0], [-0.25, 0.25 * root3, 0], [-0.25, 0.25 * root3, 0]]
     lower = [[0.25, 0.25 * root3, 0], [-0.5, 0, 0], [0.25, 0.25 * root3, 0]]
@@ -125,21 +179,21 @@ def _legs() -> Hexapod:
     six = np.ones(6)
     part = LegParts(*(_array(value * six) for value in (0.25, 0.15, 0.002, 1e-4)))
     return Hexapod(
-        p_PU_P=_array(p_PU_P),
-        p_BA_B=_array(p_DA_D + np.array([0.0, 0.0, 0.6])),
-        k_B=_array(k_B),
-        stiffness=_array(2e4 * six),
-        damping=_array(500.0 * six),
-        free_length=_array(length),
-        nominal_length=_array(length),
-        upper=part,
-        lower=part,
-        spherical_friction=_array(1e-4 * six),
-        universal_friction=_array(1e-4 * six),
+        "legs",
+        ("plate", "bus"),
+        Geometry(
+            p_PU_P=_array(p_PU_P),
+            p_BA_B=_array(p_DA_D + np.array([0.0, 0.0, 0.6])),
+            k_B=_array(k_B),
+            nominal_length=_array(length),
+        ),
+        LegBodies(part, part, _array(1e-4 * six), _array(1e-4 * six)),
+        SpringDamper(_array(2e4 * six), _array(500.0 * six), _array(length)),
+        holds,
     )
 
 
-def _cluster(imbalance: float) -> ControlMomentGyro:
+def _cluster(imbalance: float) -> Cluster:
     azimuth, skew = 0.5 * np.pi * np.arange(4), np.deg2rad(53.13)
     r = np.stack([np.cos(azimuth), np.sin(azimuth), 0.0 * azimuth], axis=1)
     z = np.array([0.0, 0.0, 1.0])
@@ -153,7 +207,7 @@ def _cluster(imbalance: float) -> ControlMomentGyro:
     def each(value: np.ndarray) -> jnp.ndarray:
         return _array(np.repeat(value[None], 4, axis=0))
 
-    return ControlMomentGyro(
+    units = ControlMomentGyro(
         p_PC_P=_array(0.42 * r),
         R_PG0=_array(np.stack([s, np.cross(g, s), g], axis=2)),
         gimbal_mass=_array(13.0 * four),
@@ -167,6 +221,10 @@ def _cluster(imbalance: float) -> ControlMomentGyro:
         rotor_speed=_array(speed * four),
         rotor_phase=_array([0.0, 0.7, 1.4, 2.1]),
     )
+    none = _array(np.inf)
+    servos = GimbalServos(_array(50.0), none, none)
+    quiet = quiet_rotors(4)
+    return Cluster("cluster", ("plate",), units, servos, ConstantSpeed(), quiet, SmoothMotor())
 
 
 def _array(value: object) -> jnp.ndarray:

@@ -41,6 +41,8 @@ def synthetic(mount="isolated", count=4000, rate=1000.0, cmgs=4, legs=6, status=
         shape = (count, *(sizes[dimension] for dimension in dimensions))
         values = 1e-3 * np.sin(np.arange(np.prod(shape)).reshape(shape))
         data[name] = (("time", *dimensions), values, {"units": unit})
+    speed = np.full((count, cmgs), 2 * np.pi * ROTOR)
+    data["rotor_speed"] = (("time", "cmg"), speed, {"units": "rad/s"})
     half = 0.5 * SLOW * time
     quaternion = np.column_stack([np.cos(half), np.sin(half), 0 * half, 0 * half])
     data["bus_attitude"] = (("time", "quaternion"), quaternion)

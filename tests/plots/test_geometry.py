@@ -32,13 +32,14 @@ TILTED = load_scenario("zhang2012").with_overrides(
 def test_parts_stand_where_the_model_has_them():
     """Oracle: the model that is built for a run, by other code."""
     placed, built = layout(TILTED), build_satellite(TILTED)
-    R_BP = Rotation.from_quat(np.asarray(built.q_BP), scalar_first=True).as_matrix()
+    (mount,), (legs,) = built.mounts, built.hexapods
+    R_BP = Rotation.from_quat(np.asarray(mount.q_BX), scalar_first=True).as_matrix()
     np.testing.assert_allclose(placed.R_BD, R_BP, atol=1e-12)
-    np.testing.assert_allclose(placed.p_BP_B, built.p_BP_B, atol=1e-12)
-    np.testing.assert_allclose(placed.lower_B, built.legs.p_BA_B, atol=1e-12)
-    upper = np.asarray(built.p_BP_B) + np.asarray(built.legs.p_PU_P) @ R_BP.T
+    np.testing.assert_allclose(placed.p_BP_B, mount.p_BX_B, atol=1e-12)
+    np.testing.assert_allclose(placed.lower_B, legs.geometry.p_BA_B, atol=1e-12)
+    upper = np.asarray(mount.p_BX_B) + np.asarray(legs.geometry.p_PU_P) @ R_BP.T
     np.testing.assert_allclose(placed.upper_B, upper, atol=1e-12)
-    np.testing.assert_allclose(placed.axes_B, built.legs.k_B, atol=1e-12)
+    np.testing.assert_allclose(placed.axes_B, legs.geometry.k_B, atol=1e-12)
 
 
 def test_momentum_turns_with_the_gimbals():

@@ -11,7 +11,7 @@ import xarray as xr
 import quietbus as qb
 from quietbus import plots
 from quietbus.analysis.jitter.lines import KINDS
-from quietbus.model.cmg import ORDERS
+from quietbus.model.moments import ORDERS
 from quietbus.plots import (
     compare_figures,
     envelope_comparison,
@@ -44,6 +44,10 @@ def synthetic(mount, size=SIZE, count=50, **attributes):
         shape = (count, *(sizes[dimension] for dimension in dimensions))
         data[name] = (("time", *dimensions), np.full(shape, 1e-3), {"units": unit})
     data["bus_attitude"] = (("time", "quaternion"), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)))
+    speed = np.full((count, 4), 200.0 * np.pi)
+    data["rotor_speed"] = (("time", "cmg"), speed, {"units": "rad/s"})
+    angle = PHASES + speed * time[:, None]
+    data["rotor_angle"] = (("time", "cmg"), angle, {"units": "rad"})
     if mount == "isolated":
         size = size * PASSED
     grown = size * (1.0 + time / 4.9)[:, None, None, None]
@@ -202,6 +206,7 @@ def test_a_rotor_of_its_own_speed_has_its_own_line_and_no_sum():
     ]
     changed = scenario.with_overrides({"cluster.pyramid": None, "cluster.units": units})
     run.attrs["scenario"] = changed.to_yaml()
+    run["rotor_speed"] = run["rotor_speed"] + 2.0 * np.pi * np.arange(4)
     figure = run_figures(run)["spectrum"]
     (top,) = figure.axes[0].child_axes
     named = [name.get_text() for name in top.get_xticklabels()]

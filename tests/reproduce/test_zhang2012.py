@@ -101,7 +101,7 @@ def test_the_papers_universal_joint_turns_where_it_cannot(bench):
     lower, upper = bench.study.scenario.isolator.joints()
     s = upper - lower
     s = s / np.linalg.norm(s, axis=1, keepdims=True)
-    k = np.asarray(bench.study.satellite.legs.k_B)
+    k = np.asarray(bench.study.satellite.hexapods[0].geometry.k_B)
     h = s - np.sum(k * s, axis=1, keepdims=True) * k
     along = h @ rate
     missed = along / np.sum(s * h, axis=1)

@@ -153,7 +153,7 @@ def test_disk_without_room_is_told_before_the_flight(tmp_path, monkeypatch):
     monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=1_000_000))
     path, reached = tmp_path / "run.nc.checkpoint", []
     with pytest.raises(
-        OutputError, match=r"too little room: .* need about 3\.\d+ MB, 1 MB are free"
+        OutputError, match=r"too little room: .* need about 4\.\d+ MB, 1 MB are free"
     ):
         qb.simulate("zhang2012", duration=LENGTH, checkpoint=path, progress=reached.append)
     assert not reached

@@ -217,7 +217,7 @@ HARMS = {
     "a pipe": (lambda p: (p.unlink(), os.mkfifo(p)), "is a pipe, socket or device"),
     "empty": (lambda p: p.write_bytes(b""), "not a NetCDF-4 file (expected a run"),
 } | {
-    f"no {name}": (instead(name, lambda *_: None), f"not a run of quietbus: it has no {name}")
+    f"no {name}": (instead(name, lambda *_: None), f"run of quietbus: it has no {name}")
     for name in VARIABLES
 }
 

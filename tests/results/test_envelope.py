@@ -19,8 +19,9 @@ def vibrating(count=5001, rate=1000.0, slow=lambda t: 1e-3 * np.sin(0.3 * t), gr
     time = np.arange(count) / rate
     wave = (1.0 + grows * time) * np.sin(2.0 * np.pi * ROTOR * time + 0.3)
     rates = slow(time)[:, None] + wave[:, None] * AMPLITUDE
+    speeds = np.full((count, 4), 2.0 * np.pi * ROTOR)
     return xr.Dataset(
-        {"bus_rate": (("time", "axis"), rates)},
+        {"bus_rate": (("time", "axis"), rates), "rotor_speed": (("time", "cmg"), speeds)},
         {"time": time},
         {"scenario": scenario.to_yaml(), "mount": "isolated", "method": "direct"},
     )

@@ -217,6 +217,7 @@ def mangled_data(seed: int) -> dict[str, Any]:
         data["cluster"]["gimbal_motor"] = copy.deepcopy(MOTOR)
     if chance.random() < 0.3:
         data["control"], data["cluster"]["run_up"] = "none", dict(RUN_UP)
+    chance.choice([_as_it_is, _of_blocks, _of_platforms, _with_payload])(data)
     for _ in range(chance.randint(1, 3)):
         places = list(_places(data))
         within, key = chance.choice(places)
@@ -231,6 +232,29 @@ def mangled_data(seed: int) -> dict[str, Any]:
             case _:
                 within[key] = chance.choice(ODD)
     return data
+
+
+def _as_it_is(data: dict[str, Any]) -> None:
+    """One platform with one block of units."""
+
+
+def _of_blocks(data: dict[str, Any]) -> None:
+    """CMGs and wheels on one plate."""
+    wheels = load_scenario("wheels-demo").to_dict()["cluster"]
+    data["cluster"] = [data["cluster"], wheels]
+
+
+def _of_platforms(data: dict[str, Any]) -> None:
+    """One platform on another."""
+    parts = {key: data.pop(key) for key in ("isolator", "cluster")}
+    above = copy.deepcopy(parts) | {"name": "above", "on": "plate"}
+    data["platforms"] = [above, parts | {"name": "plate"}]
+
+
+def _with_payload(data: dict[str, Any]) -> None:
+    """A bench with the lines of sight."""
+    isolator = copy.deepcopy(data["isolator"])
+    data["payload"] = {"body": isolator.pop("plate"), "isolator": isolator}
 
 
 def _places(data: Any) -> Iterator[tuple[Any, Any]]:

@@ -5,6 +5,8 @@ import pytest
 
 import quietbus as qb
 from quietbus.build import build_satellite
+from quietbus.model.disturbance import QuietRotors
+from quietbus.model.gimbal_motor import SmoothMotor
 
 TABLE = {
     "orders": [
@@ -31,7 +33,7 @@ def test_a_table_becomes_channels_of_the_model():
     scenario = with_table(TABLE)
     assert qb.Scenario.from_yaml(scenario.to_yaml()) == scenario
     assert scenario.cluster.orders == (1.0, 2.0, 2.83)
-    built = build_satellite(scenario).disturbance
+    built = build_satellite(scenario).clusters[0].disturbance
     coefficient, phase = np.asarray(built.coefficient), np.asarray(built.phase)
     expected = np.zeros((3, 6))
     expected[0, :2] = 7.5e-8, 1e-9 * (30 / np.pi) ** 2  # rpm^-2 to s^2/rad^2
@@ -40,9 +42,9 @@ def test_a_table_becomes_channels_of_the_model():
     assert phase[:, 2, 3] == pytest.approx(np.pi / 2)
     random = phase[:, [0, 2], [0, 2]]
     assert np.unique(random).size == 8  # every rotor and line its own
-    again = build_satellite(scenario).disturbance
+    again = build_satellite(scenario).clusters[0].disturbance
     assert np.array_equal(again.phase, built.phase)
-    other = build_satellite(with_table(TABLE | {"seed": 6})).disturbance
+    other = build_satellite(with_table(TABLE | {"seed": 6})).clusters[0].disturbance
     assert not np.any(np.asarray(other.phase)[:, [0, 2], [0, 2]] == random)
     assert np.asarray(built.period)[0] == pytest.approx([0, 0, 1 / (120 * np.pi)])
 
@@ -61,7 +63,7 @@ def test_a_unit_may_have_another_table_or_none():
     data["cluster"]["rotor"]["disturbance"] = TABLE
     scenario = qb.Scenario.from_dict(data)
     assert qb.Scenario.from_yaml(scenario.to_yaml()) == scenario
-    built = build_satellite(scenario).disturbance
+    built = build_satellite(scenario).clusters[0].disturbance
     assert list(np.asarray(built.order)) == [1.0, 2.0, 2.83, 3.5]
     there = np.any(np.asarray(built.coefficient) > 0, axis=2)
     assert there.tolist() == [
@@ -74,9 +76,9 @@ def test_a_unit_may_have_another_table_or_none():
 
 
 def test_no_table_builds_no_disturbance():
-    satellite = build_satellite(qb.load_scenario("zhang2012"))
-    assert satellite.disturbance is None
-    assert satellite.motor is None
+    (cluster,) = build_satellite(qb.load_scenario("zhang2012")).clusters
+    assert type(cluster.disturbance) is QuietRotors
+    assert type(cluster.motor) is SmoothMotor
     assert qb.load_scenario("zhang2012").cluster.orders == (1, 2)
 
 

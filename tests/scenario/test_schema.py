@@ -63,7 +63,7 @@ MISTAKES = [
     ("law: singularity_robust", "law: singularity_robust, epsilon0: 1", "control.steering.epsilon0 (line {}): unknown key 'epsilon0'; known here: law, lambda0, mu"),
     ("kd: 2500}", "kd: 2500, gain: 3}", "control.pid.kp (line {}): unknown key 'kp'; known here: gain, zeros"),
     # missing values
-    ("stiffness: 20 kN/m", "stiffness:", "isolator.legs.stiffness (line {}): expected a stiffness in N/m, got nothing"),
+    ("stiffness: 20 kN/m", "stiffness:", "isolator.legs.stiffness (line {}): expected a stiffness in N/m, or a strut; got nothing"),
     ("{mass: 0.25 kg, distance: 0.15 m,", "{mass: 0.25 kg,", "isolator.legs.upper_part.distance (line {}): expected a length in m, got nothing"),
     ("ki: 0.1,", "", "control.pid.ki (line {}): expected an integral gain in N*m/(rad*s), got nothing"),
     # no numbers
@@ -618,7 +618,7 @@ def test_loads_of_every_profile():
 @pytest.mark.parametrize(
     ("load", "message"),
     [
-        ({"body": "buss"}, "body: expected 'bus' or 'plate', got 'buss'"),
+        ({"body": "buss"}, "body: expected a body, one of bus, plate; got 'buss'"),
         ({"force": [1, 2, "3 N*m"]}, "force[2]: expected a force in N, got '3 N*m' (a torque?)"),
         ({"profile": "steps"}, "profile: expected constant or a mapping with one of step, half_"),
         (

@@ -9,7 +9,7 @@ import quietbus as qb
 def test_isolator_and_cluster_are_one_site(name):
     scenario = qb.load_scenario(name)
     (site,) = scenario.sites
-    assert site.name == "platform"
+    assert site.name == "plate"
     assert site.isolator == scenario.isolator
     assert site.blocks == (scenario.cluster,)
     assert "sites" not in scenario.to_dict()

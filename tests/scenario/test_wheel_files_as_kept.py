@@ -239,7 +239,7 @@ def test_building_takes_a_time_linear_in_the_orders():
         data["cluster"]["rotor"]["disturbance"] = {"orders": orders}
         scenario = Scenario.from_dict(data)
         start = time.process_time()
-        assert len(build_satellite(scenario).disturbance.order) >= count
+        assert len(build_satellite(scenario).clusters[0].disturbance.order) >= count
         return time.process_time() - start
 
     taken(10)

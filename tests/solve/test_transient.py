@@ -6,21 +6,31 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from quietbus.dynamics.vibration import Vibration, View
+from quietbus.dynamics.layout import Layout
+from quietbus.dynamics.memory import Answering, Memory
+from quietbus.dynamics.vibration import Vibration
+from quietbus.dynamics.views import View
+from quietbus.model.motion import Motion
 from quietbus.solve.transient import Modes, transient
 
-NATURAL = np.linspace(15.0, 26.0, 12)  # [rad/s] of twelve oscillators
-DAMPING = np.linspace(0.3, 0.1, 12)  # [1/s]
-SEEN = slice(9, 12)  # the turn of the bus
+BUS_LAST = np.roll(np.arange(12), 6)  # the bus's come first
+NATURAL = np.linspace(15.0, 26.0, 12)[BUS_LAST]  # [rad/s] of twelve oscillators
+DAMPING = np.linspace(0.3, 0.1, 12)[BUS_LAST]  # [1/s]
+SEEN = slice(3, 6)  # the turn of the bus
+SATELLITE = SimpleNamespace(mounts=[SimpleNamespace(body="plate")])
 ORDERS = np.array([1.0, 2.0])
 
 
 def oscillators():
     """Unit masses; nothing turns."""
-    plates = SimpleNamespace(w_B=np.zeros(3), p_BP=np.zeros(3))
-    slow, none = SimpleNamespace(plates=plates), None
+    layout = Layout((("bus", 6), ("plate", 6)), 2)
+    rest = Motion(np.eye(3), *np.zeros((3, 3)))
+    now = SimpleNamespace(layout=layout, motions={"bus": rest, "plate": rest})
     M, C, K = np.eye(12), np.diag(2.0 * DAMPING), np.diag(NATURAL**2)
-    return Modes.of(Vibration(slow, M, C, K, none, none))
+    parts = (*(np.zeros((0, 0)) for _ in range(5)), np.zeros((3, 12, 0)), np.zeros((12, 0)))
+    nothing = Memory(Answering((), (), (), ()), *parts)
+    slow = SimpleNamespace(now=now)
+    return Modes.of(Vibration(slow, layout, M, C, K, nothing, np.eye(12), np.zeros((12, 12)), {}))
 
 
 def steady(force, speed):
@@ -50,7 +60,7 @@ def constant(t):
     """Order 2 is weaker, and along other axes."""
     force = np.zeros((len(t), 2, 12), complex)
     force[:, 0], force[:, 1] = np.linspace(1.0, 2.0, 12), 0.2j * np.linspace(2.0, -1.0, 12)
-    return force
+    return force[..., BUS_LAST]
 
 
 def turning(t):
@@ -65,7 +75,7 @@ def test_run_up_past_the_modes_rings_for_as_long_as_they_do(output_rate):
     angle = lambda t: 5.0 * t + 2.5 * np.minimum(t, 8.0) ** 2 + 40.0 * np.maximum(t - 8.0, 0.0)  # noqa: E731
     time = np.arange(0.0, 14.0, 1.0 / output_rate)
     xi = steady(constant(time), speed(time))
-    found = transient(time, xi, speed(time)[:, None], ORDERS, {0: oscillators()}, VIEW)
+    found = transient(SATELLITE, time, xi, speed(time)[:, None], ORDERS, {0: oscillators()}, VIEW)
     expected = sum(true_transient(time, constant, angle, speed, h) for h in (0, 1))
     error = np.abs(found.bus_rate - expected)
     assert np.max(error) < 0.03 * np.max(expected)
@@ -84,7 +94,13 @@ def test_forces_that_turn_lag_and_a_start_rings(speed):
     time = np.arange(0.0, 6.0, 0.1)
     even = np.full(len(time), speed)
     found = transient(
-        time, steady(turning(time), even), even[:, None], ORDERS, {0: oscillators()}, VIEW
+        SATELLITE,
+        time,
+        steady(turning(time), even),
+        even[:, None],
+        ORDERS,
+        {0: oscillators()},
+        VIEW,
     )
     expected = sum(
         true_transient(time, turning, lambda t: speed * t, lambda t: 0.0 * t + speed, h)
@@ -99,7 +115,7 @@ def test_several_bases_follow_on_without_a_seam():
     speed = (5.0 + 3.0 * time)[:, None]
     xi = steady(constant(time), speed[:, 0])
     one, four = (
-        transient(time, xi, speed, ORDERS, dict.fromkeys(at, oscillators()), VIEW)
+        transient(SATELLITE, time, xi, speed, ORDERS, dict.fromkeys(at, oscillators()), VIEW)
         for at in ([50], [0, 7, 60, 119])
     )
     np.testing.assert_allclose(four.bus_rate, one.bus_rate, atol=1e-9 * one.bus_rate.max())
@@ -112,7 +128,7 @@ def test_a_line_of_sight_is_moved_by_the_bus_alone_where_the_plate_follows():
     time = np.arange(0.0, 4.0, 0.1)
     speed = (5.0 + 3.0 * time)[:, None]
     xi = steady(constant(time), speed[:, 0])
-    found = transient(time, xi, speed, ORDERS, {0: oscillators()}, view)
+    found = transient(SATELLITE, time, xi, speed, ORDERS, {0: oscillators()}, view)
     # far from rest the oscillators ring at 23 to 26 rad/s
     ratio = found.bus_rate[-1] / found.line_of_sight[-1, 0]
     assert 20.0 < ratio < 30.0

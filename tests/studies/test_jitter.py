@@ -66,13 +66,16 @@ def test_static_imbalance_on_a_rigid_mount_has_a_closed_form():
     )
     study = qb.jitter(scenario)
     satellite = study.satellite("rigid")
-    cluster = satellite.cluster
+    cluster = satellite.clusters[0].units
     speed = 2 * np.pi * 100.0
-    masses = [float(satellite.bus.mass), float(satellite.plate.mass)]
-    places = [np.zeros(3), np.asarray(satellite.p_BP_B)]
-    inertias = [np.asarray(satellite.bus.I_BBcm_B), np.asarray(satellite.plate.I_PPcm_P)]
+    masses = [float(satellite.bus.mass_X), float(satellite.body("plate").mass_X)]
+    places = [np.zeros(3), np.asarray(satellite.mounts[0].p_BX_B)]
+    inertias = [np.asarray(satellite.bus.I_XXcm_X), np.asarray(satellite.body("plate").I_XXcm_X)]
     for j in range(4):
-        R, C = np.asarray(cluster.R_PG0[j]), np.asarray(satellite.p_BP_B + cluster.p_PC_P[j])
+        R, C = (
+            np.asarray(cluster.R_PG0[j]),
+            np.asarray(satellite.mounts[0].p_BX_B + cluster.p_PC_P[j]),
+        )
         masses += [float(cluster.gimbal_mass[j]), float(cluster.rotor_mass[j])]
         places += [C, C]
         inertias += [R @ I @ R.T for I in (cluster.I_GGcm_G[j], cluster.I_RRcm_R[j])]

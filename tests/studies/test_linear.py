@@ -68,15 +68,22 @@ def test_limits_by_height_are_those_of_a_scenario_so_built(paper):
     assert limits[0] == pytest.approx(moved.coupled.stable_gain_range[0], rel=1e-8)
     assert limits[1] == pytest.approx(paper.coupled.stable_gain_range[0], rel=1e-8)
     satellite = at_height(paper.satellite, height)
+    np.testing.assert_allclose(
+        satellite.mounts[0].p_BX_B, moved.satellite.mounts[0].p_BX_B, atol=1e-14
+    )
     for leaf in ("p_PU_P", "p_BA_B", "nominal_length"):
-        here, there = (np.asarray(getattr(s.legs, leaf)) for s in (satellite, moved.satellite))
+        here, there = (
+            np.asarray(getattr(s.hexapods[0].geometry, leaf)) for s in (satellite, moved.satellite)
+        )
         np.testing.assert_allclose(here, there, atol=1e-14)
 
 
 def test_legs_without_mass_keep_their_struts(paper):
-    light = without_leg_mass(paper.satellite).legs
-    assert float(light.upper.mass.sum() + light.lower.axial_inertia.sum()) == 0.0
-    np.testing.assert_array_equal(light.stiffness, paper.satellite.legs.stiffness)
+    (light,) = without_leg_mass(paper.satellite).hexapods
+    assert float(light.bodies.upper.mass.sum() + light.bodies.lower.axial_inertia.sum()) == 0.0
+    np.testing.assert_array_equal(
+        light.strut.stiffness, paper.satellite.hexapods[0].strut.stiffness
+    )
 
 
 # --- the numbers of docs/analysis.md ------------------------------------------------------------
@@ -125,7 +132,7 @@ def test_page_has_limits_and_jitter_by_stiffness_and_damping():
 
 def test_page_says_what_the_lever_does(paper):
     """Its formula for G_H with polynomials of NumPy, about y."""
-    mass, _, inertia = platform_inertia(paper.satellite, np.zeros(4))
+    mass, _, inertia = platform_inertia(paper.satellite, np.zeros(4), "plate")
     legs = paper.scenario.isolator.legs
     u = np.array([np.ravel(legs.damping)[0], np.ravel(legs.stiffness)[0]])
     a, b, d = 2.0, 0.25 * np.sqrt(2.0), 0.25
@@ -149,7 +156,7 @@ def test_page_says_what_the_lever_does(paper):
 
     assert d - b * base == pytest.approx(0.125)
     assert limit(base, 900.0) == pytest.approx(paper.loop_analyses["y"].stable_gain_range[0][1])
-    bus = float(paper.satellite.bus.mass)
+    bus = float(paper.satellite.bus.mass_X)
     lever = bus * mass / (bus + mass) * (base + 0.6) ** 2  # about the common mass centre
     modes = np.sort(np.unique(np.abs(np.roots(channel(base)[1])).round(6))) / (2.0 * np.pi)
     for said, here in (

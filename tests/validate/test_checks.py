@@ -3,6 +3,7 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+import equinox as eqx
 import jax
 import numpy as np
 import pytest
@@ -58,17 +59,20 @@ def test_a_satellite_of_another_scenario_is_seen(path, value, seen_by):
 
 
 def _wrong_Kd(satellite):
-    return replace(satellite, controller=replace(satellite.controller, kd=-satellite.controller.kd))
+    control = satellite.control
+    controller = replace(control.controller, kd=-control.controller.kd)
+    return replace(satellite, control=replace(control, controller=controller))
 
 
 def _wrong_lever(satellite):
-    first, *others = satellite.loads
-    return replace(satellite, loads=(replace(first, point=-first.point), *others))
+    first, *others = satellite.others
+    return replace(satellite, others=(replace(first, point=-first.point), *others))
 
 
 def _lower_joints_not_turned(satellite):
     joints = np.array(awkward_scenario().isolator.legs.lower_joints) + np.array([0.05, -0.1, 0.6])
-    return replace(satellite, legs=replace(satellite.legs, p_BA_B=jax.numpy.asarray(joints)))
+    at = lambda s: s.hexapods[0].geometry.p_BA_B  # noqa: E731
+    return eqx.tree_at(at, satellite, jax.numpy.asarray(joints))
 
 
 @pytest.mark.parametrize(

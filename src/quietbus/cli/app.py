@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 from importlib.metadata import version
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -12,6 +13,7 @@ from typer.core import TyperGroup
 
 from quietbus.cli.given import Asked
 from quietbus.cli.guard import BAD_INPUT, FAILED, BadInput, remove_empty_folders
+from quietbus.cli.own_parts import load_parts
 from quietbus.cli.session import on_interrupt
 from quietbus.processes import DeviceError
 from quietbus.words import visible_lines
@@ -53,8 +55,18 @@ def _common(
             "--version", callback=_print_version, is_eager=True, help="Print the version."
         ),
     ] = False,
+    parts: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--parts",
+            metavar="FILE.py",
+            help="A Python file that registers parts of your own; may be given again.",
+        ),
+    ] = None,
 ) -> None:
     """Design, simulate and verify vibration isolation platforms for CMGs on satellites."""
+    for file in parts or ():
+        load_parts(file)
 
 
 def main() -> None:

@@ -62,7 +62,7 @@ def simulate(
 ) -> None:
     """Simulate a scenario; write the run and print what one wants to know of it."""
     checked, way = load(scenario, mount, duration, output_rate), method_object(method)
-    chosen = checked.isolator.mount
+    chosen = checked.mount
     name = f"{file_name(checked.name)[:LONGEST]}-{chosen}"
     output = output or Path(f"{name}{'-harmonic' if way.jitter_apart else ''}.nc")
     check_file(output, RUN)
@@ -76,7 +76,7 @@ def simulate(
     from quietbus.results import summarize, with_worst_phases
     from quietbus.results.checkpoint import CheckpointError
     from quietbus.runs import SimulationError
-    from quietbus.solve.harmonic import ResonanceError
+    from quietbus.solve.validity import ResonanceError
     from quietbus.tables.runs import summary_table
 
     failed = ""

@@ -53,7 +53,7 @@ def validate(
     except ImportError as error:
         fail(str(error))
     show_as_read(checked)
-    print_table(checks_table(f"{checked.name}, {checked.isolator.mount}", checks))
+    print_table(checks_table(f"{checked.name}, {checked.mount}", checks))
     fail_unless_passed(checks)
     print(f"all {len(checks)} checks passed (errors are relative)")
 

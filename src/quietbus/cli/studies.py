@@ -146,7 +146,7 @@ def verify(
     from quietbus import api
     from quietbus.analysis.pointing.chi_square import UnsoundStatisticError
     from quietbus.runs import SimulationError
-    from quietbus.solve.harmonic import ResonanceError
+    from quietbus.solve.validity import ResonanceError
 
     try:
         with progress({method.value: checked.simulation.duration}) as tell, notes():

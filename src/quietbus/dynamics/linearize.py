@@ -9,15 +9,17 @@ All deviations are in the frame that turns with the satellite's steady rate, who
 bus axes at the operating point:
 
     bus_attitude      rotation vector of the bus from its operating attitude [rad]
-    plate_position    origin of P from the bus mass centre, deviation [m]
+    plate_position    origin of P from the bus mass centre, deviation [m]; alike for other bodies
     plate_attitude    rotation vector of the plate [rad]
     bus_rate, plate_velocity (relative to the bus), plate_rate
-    gimbal_angle, gimbal_rate; of reaction wheels rotor_speed instead
+    what elements have of their own: gimbal_angle, gimbal_rate; of reaction wheels rotor_speed;
+    NAME_memory of struts with memory
     bus_velocity, bus_position
 """
 
 import functools
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import equinox as eqx
@@ -26,15 +28,17 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from quietbus.dynamics.closed_loop import torque_axes
-from quietbus.dynamics.equations import Accelerations, Wrench, accelerations, plate_motion
-from quietbus.dynamics.kinematics import leg_motion
-from quietbus.dynamics.state import State
-from quietbus.model.cmg import ClusterMoments, ControlMomentGyro
-from quietbus.model.rotor import RotorState, WheelMotors
-from quietbus.model.satellite import Satellite
-from quietbus.model.steering import PseudoInverse
-from quietbus.spatial.inertia import point_inertia
+from quietbus.dynamics.closed_loop import attitudes, initial_state, nominal_arounds
+from quietbus.dynamics.equations import Moving, accelerations, moving, rates_of
+from quietbus.dynamics.linear_model import LinearModel
+from quietbus.dynamics.outputs import joined
+from quietbus.dynamics.state import BodyState, State
+from quietbus.model.control import Actuators
+from quietbus.model.element import Own
+from quietbus.model.report import AXIS
+from quietbus.model.satellite import BUS, CONTROL, Satellite
+from quietbus.model.steering import PseudoInverse, Steering
+from quietbus.model.unit import rotor_centres_P
 from quietbus.spatial.rotation import (
     quaternion_conjugate,
     quaternion_multiply,
@@ -42,121 +46,16 @@ from quietbus.spatial.rotation import (
     quaternion_to_rotation_vector,
     rotation_vector_to_quaternion,
 )
+from quietbus.spatial.vector import cross
 
 AXES = ("x", "y", "z")
-Actuator = Literal["servo", "ideal"]
+Actuation = Literal["servo", "ideal"]
+NEWTON_STEPS = 20
+SINGULAR = 1e9  # [rad/s per N m] gimbal rates for a torque, above which there is no steering
+PIVOT = "rotor_angle"  # nothing depends on the angles of rotors whose imbalance is averaged
 
 
-class LinearModel(NamedTuple):
-    """``dx/dt = A x + B u``, ``y = C x + D u`` with names for every row and column."""
-
-    A: np.ndarray
-    B: np.ndarray
-    C: np.ndarray
-    D: np.ndarray
-    states: tuple[str, ...]
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-
-    def select(
-        self, inputs: list[str] | None = None, outputs: list[str] | None = None
-    ) -> "LinearModel":
-        """The model with some inputs and outputs only; a name without axis takes all three.
-
-        Raises:
-            KeyError: a name that the model does not have, with the ones it has.
-        """
-        columns = _indices(self.inputs, inputs, "input")
-        rows = _indices(self.outputs, outputs, "output")
-        return self._replace(
-            B=self.B[:, columns],
-            C=self.C[rows],
-            D=self.D[np.ix_(rows, columns)],
-            inputs=tuple(self.inputs[i] for i in columns),
-            outputs=tuple(self.outputs[i] for i in rows),
-        )
-
-    def internal(self) -> "LinearModel":
-        """The model without the satellite's position and velocity as a whole.
-
-        Nothing depends on them; outputs that are them are dropped.
-        """
-        kept = [i for i, name in enumerate(self.states) if not name.startswith(_AS_A_WHOLE)]
-        gone = [i for i, name in enumerate(self.states) if name.startswith(_AS_A_WHOLE)]
-        rows = [i for i in range(len(self.outputs)) if not np.any(self.C[i, gone])]
-        return self._replace(
-            A=self.A[np.ix_(kept, kept)],
-            B=self.B[kept],
-            C=self.C[np.ix_(rows, kept)],
-            D=self.D[rows],
-            states=tuple(self.states[i] for i in kept),
-            outputs=tuple(self.outputs[i] for i in rows),
-        )
-
-    def response(self, frequency_hz: np.ndarray) -> np.ndarray:
-        """Frequency response (frequency, output, input) at frequencies [Hz]."""
-        s = 2j * np.pi * np.atleast_1d(frequency_hz)[:, None, None]
-        resolvent = np.linalg.solve(s * np.eye(len(self.A)) - self.A, self.B.astype(complex))
-        return self.C @ resolvent + self.D
-
-    def to_control(self):
-        """A ``control.StateSpace`` with these names."""
-        import control  # slow to load, and not needed to integrate
-
-        return control.StateSpace(
-            self.A,
-            self.B,
-            self.C,
-            self.D,
-            states=list(self.states),
-            inputs=list(self.inputs),
-            outputs=list(self.outputs),
-            remove_useless_states=False,
-        )
-
-
-_AS_A_WHOLE = ("bus_velocity", "bus_position")
-
-
-def _indices(names: tuple[str, ...], wanted: list[str] | None, kind: str) -> list[int]:
-    if wanted is None:
-        return list(range(len(names)))
-    found: list[int] = []
-    for name in wanted:
-        match = [i for i, known in enumerate(names) if known == name or known[:-2] == name]
-        if not match:
-            raise KeyError(f"no {kind} '{name}'; the model has {', '.join(names)}")
-        found += match
-    return found
-
-
-def clamped(satellite: Satellite) -> Satellite:
-    """The satellite with a bus so heavy (1e12 times) that the base does not move."""
-    heavy = (1e12 * satellite.bus.mass, 1e12 * satellite.bus.I_BBcm_B)
-    return eqx.tree_at(lambda s: (s.bus.mass, s.bus.I_BBcm_B), satellite, heavy)
-
-
-def platform_inertia(
-    satellite: Satellite, gimbal_angle: np.ndarray
-) -> tuple[float, np.ndarray, np.ndarray]:
-    """Mass [kg], mass centre [m] and inertia about it [kg m^2] of the plate with its CMGs.
-
-    Plate axes, imbalance averaged over the rotors' turns.
-    """
-    mass, c, J = (np.asarray(value) for value in _platform_moments(satellite, gimbal_angle))
-    center = c / mass
-    own = J - mass * (center @ center * np.eye(3) - np.outer(center, center))
-    return float(mass), center, own
-
-
-@eqx.filter_jit
-def _platform_moments(satellite, gimbal_angle):
-    still = jnp.zeros(len(satellite.cluster.rotor_mass))
-    moments = ClusterMoments.expand(satellite.cluster).averaged()
-    carried = moments.at(jnp.asarray(gimbal_angle), still, still, still)
-    plate = satellite.plate
-    J = carried.J + plate.I_PPcm_P + point_inertia(plate.mass, plate.p_PPcm_P)
-    return carried.mass + plate.mass, carried.c + plate.mass * plate.p_PPcm_P, J
+Parts = list[tuple[tuple[str, str], tuple[str, ...]]]  # (kind, of whom) and names
 
 
 class OperatingPointError(ValueError):
@@ -167,250 +66,424 @@ class OperatingPoint(NamedTuple):
     """Where to linearise: a steady motion."""
 
     rate: np.ndarray | Array  # (3,) [rad/s] steady rate of the whole satellite, bus frame
-    gimbal_angle: np.ndarray | Array  # (cmg,) [rad]
+    gimbal_angle: np.ndarray | Array  # (cmg,) [rad] of all units
+
+
+class Pose(eqx.Module):
+    """Where things are at the operating point."""
+
+    p_BX_B: dict[str, Float[Array, "3"]]  # [m] of every body but the bus
+    q_BX: dict[str, Float[Array, "4"]]
+    own: dict[str, Own]  # of the elements; driven rates are those of the nominal motion
+
+
+class Rows(NamedTuple):
+    """Names and sizes of the parts of the state, in their order."""
+
+    names: tuple[tuple[str, ...], ...]
+    keys: tuple[tuple[str, str], ...]  # (kind, of whom) of each part
+
+    @property
+    def flat(self) -> tuple[str, ...]:
+        """All names."""
+        return tuple(name for part in self.names for name in part)
+
+    def cut(self, x: Array) -> dict[tuple[str, str], Array]:
+        """A vector by parts."""
+        ends = np.cumsum([len(part) for part in self.names])[:-1]
+        return dict(zip(self.keys, jnp.split(x, ends), strict=True))
+
+    def joined(self, parts: Mapping[tuple[str, str], Array]) -> Array:
+        """Parts as a vector."""
+        return jnp.concatenate([parts[key] for key in self.keys])
+
+    def where(self, *keys: tuple[str, str]) -> list[int]:
+        """Rows of parts, one after the other."""
+        found: list[int] = []
+        starts = np.cumsum([0, *(len(part) for part in self.names)])
+        for key in keys:
+            k = self.keys.index(key)
+            found += range(starts[k], starts[k + 1])
+        return found
 
 
 def linearize(
     satellite: Satellite,
     point: OperatingPoint,
-    actuator: Actuator = "servo",
+    actuator: Actuation = "servo",
     points: Mapping[str, np.ndarray] | None = None,
 ) -> LinearModel:
     """Linear model of the uncontrolled satellite about a steady motion.
 
     Inputs (each with _x _y _z): ``bus_force``, ``bus_torque``, ``plate_force``, ``plate_torque``
-    (about each body's origin), ``cmg<j>_force``, ``cmg<j>_torque`` at the rotor centres,
-    ``control_torque``; and ``gimbal_rate_command_<j>``, of reaction wheels
-    ``rotor_torque_command_<j>``. Outputs: the states, ``leg_stroke_<i>``,
+    (about each body's origin; of other bodies under their names), ``cmg<j>_force``,
+    ``cmg<j>_torque`` at the rotor centres, ``control_torque``; and ``gimbal_rate_command_<j>``, of
+    reaction wheels ``rotor_torque_command_<j>``. Outputs: the states, ``leg_stroke_<i>``,
     ``leg_force_<i>``, ``bus_acceleration`` and ``<name>_acceleration`` of further points.
 
     Args:
         satellite: its controller and loads are left out; its steering law, at the operating point,
-            turns ``control_torque`` into gimbal rate commands.
+            turns ``control_torque`` into commands.
         point: gimbal angles and steady rate.
         actuator: "servo": control torque by gimbal motion through the servo, or by the wheels.
-            "ideal": control torque acts on the plate as it is asked for, gimbals held and rotors
-            at constant speed.
+            "ideal": control torque acts on what carries the actuators as it is asked for, gimbals
+            held and rotors at constant speed.
         points: further points of the bus [m], bus frame, by name.
 
     Raises:
         OperatingPointError: no equilibrium (what accelerates, and how fast), or no steering there.
     """
     further = {name: jnp.asarray(p, dtype=float) for name, p in (points or {}).items()}
-    rigid = satellite.mount == "rigid"
     at = OperatingPoint(jnp.asarray(point.rate, float), jnp.asarray(point.gimbal_angle, float))
-    A, B, C, D = _at_equilibrium(satellite, at, further)
-    n_cmg, n_leg = len(satellite.cluster.rotor_mass), len(satellite.legs.stiffness)
-    wheels = satellite.cluster.wheels
-    states, inputs, outputs = _names(n_cmg, n_leg, tuple(further), wheels)
-    torque, command = slice(-3 - n_cmg, -n_cmg), slice(-n_cmg, None)
+    internal = replace(satellite, others=tuple(e for e in satellite.others if not e.external))
+    pose = _nominal(internal, jnp.asarray(at.gimbal_angle))
+    (A, B, C, D), outputs = _at_equilibrium(internal, at.rate, pose, further)
+    rows, inputs = state_rows(internal, pose), input_rows(internal)
+    states = rows.flat
+    torque = inputs.where(("torque", CONTROL))
+    command = inputs.where(*(key for key in inputs.keys if key[0] == "command"))
     if actuator == "servo":
-        steering = steering_commands(satellite, at.gimbal_angle)
+        steering = steering_commands(internal, at.gimbal_angle)
         B[:, torque], D[:, torque] = B[:, command] @ steering, D[:, command] @ steering
+        unmoved: tuple[str, ...] = (PIVOT,)
     else:
         B[:, command] = D[:, command] = 0.0
-    if rigid:
-        kept = [i for i, name in enumerate(states) if not name.startswith("plate_")]
-        A, B, C = A[np.ix_(kept, kept)], B[kept], C[:, kept]
-        states = tuple(states[i] for i in kept)
-    if wheels:  # nothing depends on the angles of rotors whose imbalance is averaged
-        kept = [i for i, name in enumerate(outputs) if not name.startswith("rotor_angle")]
-        C, D, outputs = C[kept], D[kept], tuple(outputs[i] for i in kept)
-    unmoved = ("gimbal_", "rotor_") if actuator == "ideal" else ("rotor_angle",)
-    if wheels or actuator == "ideal":
-        kept = [i for i, name in enumerate(states) if not name.startswith(unmoved)]
-        A, B, C = A[np.ix_(kept, kept)], B[kept], C[:, kept]
-        states = tuple(states[i] for i in kept)
-    return LinearModel(A, B, C, D, states, inputs, outputs)
-
-
-def _names(n_cmg: int, n_leg: int, points: tuple[str, ...], wheels: bool):
-    kinds, command = ("gimbal_angle", "gimbal_rate"), "gimbal_rate_command"
-    if wheels:
-        kinds, command = ("rotor_angle", "rotor_speed"), "rotor_torque_command"
-    spread = lambda names: [f"{name}_{axis}" for name in names for axis in AXES]  # noqa: E731
-    units = [f"{kind}_{j}" for kind in kinds for j in range(n_cmg)]
-    states = (
-        spread(["bus_attitude", "plate_position", "plate_attitude"])
-        + spread(["bus_rate", "plate_velocity", "plate_rate"])
-        + units
-        + spread(["bus_velocity", "bus_position"])
-    )
-    inputs = (
-        spread(["bus_force", "bus_torque", "plate_force", "plate_torque"])
-        + [f"cmg{j}_{kind}_{a}" for j in range(n_cmg) for kind in ("force", "torque") for a in AXES]
-        + spread(["control_torque"])
-        + [f"{command}_{j}" for j in range(n_cmg)]
-    )
-    legs = [f"{kind}_{i}" for kind in ("leg_stroke", "leg_force") for i in range(n_leg)]
-    accelerated = spread(["bus_acceleration", *(f"{name}_acceleration" for name in points)])
-    return tuple(states), tuple(inputs), tuple(states + legs + accelerated)
-
-
-def _chart(satellite: Satellite, at: OperatingPoint, x: Float[Array, " x"]) -> State:
-    """The state at deviation x, in the frame that turns with the satellite.
-
-    Wheels have their angles and speeds where CMGs have those of the gimbals.
-    """
-    n = len(satellite.cluster.rotor_mass)
-    cuts = np.cumsum([3, 3, 3, 3, 3, 3, n, n, 3])
-    theta_B, r, theta_P, w_B, v_rel, w_P, gamma, gamma_rate, v_B, p_B = jnp.split(x, cuts)
-    rate, rotor = at.rate, None
-    if satellite.cluster.wheels:
-        rotor = RotorState(gamma, satellite.cluster.rotor_speed + gamma_rate)
-        gamma = gamma_rate = jnp.zeros(n)
-    q_B, q_P = rotation_vector_to_quaternion(theta_B), rotation_vector_to_quaternion(theta_P)
-    q_P = quaternion_multiply(q_P, satellite.q_BP)
-    r = satellite.p_BP_B + r
-    if satellite.mount == "rigid":
-        R_B = quaternion_to_matrix(q_B)
-        q_P, r = quaternion_multiply(q_B, satellite.q_BP), R_B @ satellite.p_BP_B
-        w_P, v_rel = R_B @ (rate + w_B) - rate, R_B @ jnp.cross(rate + w_B, satellite.p_BP_B)
-        v_rel = v_rel - jnp.cross(rate, r)
-    R_P = quaternion_to_matrix(q_P)
-    v_B = v_B + jnp.cross(rate, p_B)
-    return State(
-        p_NB_N=p_B,
-        q_NB=q_B,
-        p_NP_N=p_B + r,
-        q_NP=q_P,
-        v_NB_N=v_B,
-        w_NB_B=jnp.asarray(rate + w_B),
-        v_NP_N=v_B + v_rel + jnp.cross(rate, r),
-        w_NP_P=R_P.T @ (rate + w_P),
-        gimbal_angle=jnp.asarray(at.gimbal_angle + gamma),
-        gimbal_rate=gamma_rate,
-        error_integral=jnp.zeros(3),
-        rotor=rotor,
+        unmoved = tuple(states[i] for i in rows.where(*(k for k in rows.keys if k[0][0] == "y")))
+    kept = [i for i, name in enumerate(states) if not name.startswith(unmoved or ("?",))]
+    seen = [i for i, name in enumerate(outputs) if not name.startswith(PIVOT)]
+    return LinearModel(
+        A[np.ix_(kept, kept)],
+        B[kept],
+        C[np.ix_(seen, kept)],
+        D[seen],
+        tuple(states[i] for i in kept),
+        inputs.flat,
+        tuple(outputs[i] for i in seen),
     )
 
 
-def _rates_and_outputs(
+def _axes(name: str) -> tuple[str, ...]:
+    return tuple(f"{name}_{axis}" for axis in AXES)
+
+
+def state_rows(satellite: Satellite, pose: Pose) -> Rows:
+    """The parts of the state."""
+    others = [name for name in satellite.free if name != BUS]
+    parts: list[tuple[tuple[str, str], tuple[str, ...]]] = [
+        (("attitude", BUS), _axes("bus_attitude"))
+    ]
+    for name in others:
+        parts += [
+            (("position", name), _axes(f"{name}_position")),
+            (("attitude", name), _axes(f"{name}_attitude")),
+        ]
+    parts.append((("rate", BUS), _axes("bus_rate")))
+    for name in others:
+        parts += [
+            (("velocity", name), _axes(f"{name}_velocity")),
+            (("rate", name), _axes(f"{name}_rate")),
+        ]
+    first, driven = 0, {}
+    for element in satellite.elements:
+        driven[element.name] = element.driven_names(first)
+        first += element.count
+    for kind, which in (("y", 0), ("y_rate", 1)):
+        for name in pose.own:
+            parts.append(((kind, name), tuple(names[which] for names in driven[name])))
+    for kind, said in (("q", "coordinate"), ("u", "coordinate_rate"), ("z", "memory")):
+        for name, own in pose.own.items():
+            count = len(getattr(own, kind))
+            parts.append(((kind, name), tuple(f"{name}_{said}_{i}" for i in range(count))))
+    parts += [
+        (("velocity", BUS), _axes("bus_velocity")),
+        (("position", BUS), _axes("bus_position")),
+    ]
+    return Rows(tuple(names for _, names in parts), tuple(key for key, _ in parts))
+
+
+def input_rows(satellite: Satellite) -> Rows:
+    """The parts of the input."""
+    parts: Parts = []
+    for body in satellite.bodies:
+        parts += [
+            (("force", body.name), _axes(f"{body.name}_force")),
+            (("torque", body.name), _axes(f"{body.name}_torque")),
+        ]
+    first = 0
+    for cluster in satellite.clusters:
+        for j in range(first, first + cluster.count):
+            parts += [
+                (("force", f"cmg{j}"), _axes(f"cmg{j}_force")),
+                (("torque", f"cmg{j}"), _axes(f"cmg{j}_torque")),
+            ]
+        first += cluster.count
+    parts.append((("torque", CONTROL), _axes("control_torque")))
+    first = 0
+    for element in satellite.elements:
+        for actuator in satellite.actuators:
+            if actuator.name == element.name:
+                names = tuple(actuator.command_names(first))
+                parts.append((("command", actuator.name), names))
+        first += element.count
+    return Rows(tuple(names for _, names in parts), tuple(key for key, _ in parts))
+
+
+def _nominal(satellite: Satellite, gimbal_angle: Array) -> Pose:
+    unit = jnp.array([1.0, 0.0, 0.0, 0.0])
+    state = initial_state(satellite, unit, jnp.zeros(3), gimbal_angle)
+    p = {name: motion.p for name, motion in satellite.nominal().items() if name != BUS}
+    q = {BUS: unit}
+    for mount in satellite.mounts:
+        q[mount.body] = quaternion_multiply(q[mount.base], mount.q_BX)
+    own = {name: each for name, each in state.own.items() if name != CONTROL}
+    return Pose(p, {name: each for name, each in q.items() if name != BUS}, own)
+
+
+def _chart(
     satellite: Satellite,
-    moments: ClusterMoments,
-    at: OperatingPoint,
+    rate: Float[Array, "3"],
+    pose: Pose,
+    x: Mapping[tuple[str, str], Array],
+) -> State:
+    """The state at deviation x, in the frame that turns with the satellite."""
+    p_B = x["position", BUS]
+    v_B = x["velocity", BUS] + cross(rate, p_B)
+    q_B = rotation_vector_to_quaternion(x["attitude", BUS])
+    bodies = {BUS: BodyState(p_B, q_B, v_B, rate + x["rate", BUS])}
+    for name in satellite.free:
+        if name == BUS:
+            continue
+        q = quaternion_multiply(rotation_vector_to_quaternion(x["attitude", name]), pose.q_BX[name])
+        r = pose.p_BX_B[name] + x["position", name]
+        w = quaternion_to_matrix(q).T @ (rate + x["rate", name])
+        v = v_B + x["velocity", name] + cross(rate, r)
+        bodies[name] = BodyState(p_B + r, q, v, w)
+    own = {
+        name: Own(*(getattr(each, k) + x[k, name] for k in ("q", "u", "y", "y_rate", "z")))
+        for name, each in pose.own.items()
+    }
+    own[CONTROL] = Own.of(z=satellite.control.controller.start())
+    return State(bodies, own)
+
+
+def _system(
+    satellite: Satellite,
+    rate: Float[Array, "3"],
+    pose: Pose,
     points: Mapping[str, Float[Array, "3"]],
     x: Float[Array, " x"],
     u: Float[Array, " u"],
-) -> tuple[Float[Array, " x"], Float[Array, " y"]]:
-    """dx/dt and the outputs, nonlinear; ``control_torque`` acts on the plate as it is."""
-    state, rate = _chart(satellite, at, x), at.rate
-    n = len(satellite.cluster.rotor_mass)
-    cuts = np.cumsum([3, 3, 3, 3, 6 * n, 3])
-    bus_force, bus_torque, plate_force, plate_torque, at_cmgs, torque, command = jnp.split(u, cuts)
-    plates = plate_motion(state)
-    R_B, R_P = plates.R_NB, plates.R_NP
-    cmg_force, cmg_torque = jnp.split(at_cmgs.reshape(n, 6), 2, axis=1)
-    wrench = Wrench(
-        force_P=R_P @ (plate_force + jnp.sum(cmg_force, axis=0)),
-        torque_P=R_P
-        @ (
-            plate_torque
-            + jnp.sum(cmg_torque, axis=0)
-            + jnp.sum(jnp.cross(_rotor_centres_P(satellite, state.gimbal_angle), cmg_force), axis=0)
-        )
-        + torque,
-        force_B=R_B @ bus_force,
-        torque_B=R_B @ bus_torque,
-    )
-    phi = jnp.zeros(n)  # of no effect: the moments are averaged over it
-    moved = unit_acceleration = satellite.servo.bandwidth * (command - state.gimbal_rate)
-    spin_up, unit_rate = None, state.gimbal_rate
-    if state.rotor is not None:
-        spin_up = unit_acceleration = command / satellite.cluster.I_RRcm_R[:, 0, 0]
-        moved, unit_rate = jnp.zeros(n), state.rotor.speed - satellite.cluster.rotor_speed
-    a = accelerations(satellite, state, phi, moved, wrench, moments, spin_up)
-
-    v_rel = plates.v_P - plates.v_B
-    turning = v_rel - jnp.cross(rate, plates.p_BP)  # of P about B, seen in the turning frame
-    bus_speed = plates.v_B - jnp.cross(rate, state.p_NB_N)
-    x_rate = jnp.concatenate(
-        [
-            state.w_NB_B - R_B.T @ rate,
-            turning,
-            plates.w_P - rate,
-            R_B.T @ a.w_B,
-            a.v_P - a.v_B - jnp.cross(rate, v_rel) - jnp.cross(rate, turning),
-            a.w_P - jnp.cross(rate, plates.w_P),
-            unit_rate,
-            unit_acceleration,
-            a.v_B - jnp.cross(rate, plates.v_B) - jnp.cross(rate, bus_speed),
-            bus_speed,
-        ]
-    )
-    return x_rate, _outputs(satellite, at, state, a, points, turning, bus_speed)
+) -> tuple[Float[Array, " x"], dict[str, Float[Array, " k"]]]:
+    """dx/dt and the outputs by name, nonlinear; ``control_torque`` acts as it is."""
+    rows, inputs = state_rows(satellite, pose), input_rows(satellite)
+    state = _chart(satellite, rate, pose, rows.cut(x))
+    now = moving(satellite, jnp.zeros(()), state)
+    given = inputs.cut(u)
+    rates = {}
+    for element in satellite.elements:
+        if element.name in now.own:
+            around = now.around(element)
+            command = given.get(("command", element.name), jnp.zeros_like(around.own.y))
+            rates[element.name] = element.rates(around, command)
+    a = accelerations(satellite, now, rates, _forces(satellite, now, given))
+    moved = _rates(satellite, rate, pose, state, now, rates, a)
+    outputs = _outputs(satellite, rate, pose, state, now, rates, a, moved, points)
+    return rows.joined(moved), outputs
 
 
-def _outputs(satellite, at, state, a: Accelerations, points, turning, bus_speed):
-    plates = plate_motion(state)
-    legs = leg_motion(satellite.legs, plates)
-    R_B, w_B = plates.R_NB, plates.w_B
-    q_tilt = quaternion_multiply(state.q_NP, quaternion_conjugate(satellite.q_BP))
-    unit_angle, unit_rate = state.gimbal_angle - at.gimbal_angle, state.gimbal_rate
-    if state.rotor is not None:
-        unit_angle = state.rotor.angle
-        unit_rate = state.rotor.speed - satellite.cluster.rotor_speed
-    arms = [jnp.zeros(3), *(R_B @ p for p in points.values())]
-    return jnp.concatenate(
-        [
-            quaternion_to_rotation_vector(state.q_NB),
-            plates.p_BP - satellite.p_BP_B,
-            quaternion_to_rotation_vector(q_tilt),
-            state.w_NB_B - at.rate,
-            turning,
-            plates.w_P - at.rate,
-            unit_angle,
-            unit_rate,
-            bus_speed,
-            state.p_NB_N,
-            legs.length - satellite.legs.nominal_length,
-            satellite.legs.strut_force(legs.length, legs.length_rate),
-            *(
-                R_B.T @ (a.v_B + jnp.cross(a.w_B, r) + jnp.cross(w_B, jnp.cross(w_B, r)))
-                for r in arms
-            ),
-        ]
-    )
+def _forces(satellite: Satellite, now: Moving, given: Mapping[tuple[str, str], Array]) -> Array:
+    """The inputs' forces on all speeds."""
+    layout = now.layout
+    force = {name: jnp.zeros(size) for name, size in layout.parts}
+    for body in satellite.bodies:
+        R = now.motions[body.name].R_AX
+        both = (R @ given["force", body.name], R @ given["torque", body.name])
+        force[body.name] = jnp.concatenate(both)
+    first = 0
+    for cluster in satellite.clusters:
+        around = now.around(cluster)
+        (carrier,) = around.hosts
+        numbers = range(first, first + cluster.count)
+        first += cluster.count
+        forces = jnp.stack([given["force", f"cmg{j}"] for j in numbers])
+        torques = jnp.stack([given["torque", f"cmg{j}"] for j in numbers])
+        angle = cluster.at(now.t, now.own).gimbal.angle
+        torques = torques + jnp.cross(rotor_centres_P(cluster.units, angle), forces)
+        both = (carrier.R_AX @ jnp.sum(forces, axis=0), carrier.R_AX @ jnp.sum(torques, axis=0))
+        name = cluster.hosts[0]
+        force[name] = force[name] + jnp.concatenate(both)
+    for name, share in _carriers(satellite, now).items():
+        force[name] = force[name].at[3:].add(share @ given["torque", CONTROL])
+    return jnp.concatenate([force[name] for name, _ in layout.parts])
 
 
-def _rotor_centres_P(satellite, gimbal_angle):
-    cluster = satellite.cluster
-    R_PG = eqx.filter_vmap(ControlMomentGyro.R_PG)(cluster, gimbal_angle)
-    return cluster.p_PC_P + jnp.einsum("jab,jb->ja", R_PG, cluster.p_CR_G)
+def _carriers(satellite: Satellite, now: Moving) -> dict[str, Float[Array, "3 3"]]:
+    """Parts of a torque that the bodies take which carry actuators: all of it where it is one.
 
-
-def _at_equilibrium(satellite, at, points):
-    """A, B, C, D where the plate is in equilibrium.
-
-    Newton's method on the plate's pose: struts may be preloaded, or in the field of a steady turn.
+    Several share it as their actuators can, least squares of full commands.
     """
+    units = (*satellite.actuators, *satellite.clusters)
+    names = dict.fromkeys(element.hosts[0] for element in units)
+    if len(names) < 2:
+        return dict.fromkeys(names, jnp.eye(3))
+    able = {name: jnp.zeros((3, 3)) for name in names}
+    for actuator in satellite.actuators:
+        authority = actuator.authority(now.around(actuator))
+        axes = authority.torque * authority.axes_A
+        able[actuator.hosts[0]] = able[actuator.hosts[0]] + axes @ axes.T
+    whole = jnp.linalg.pinv(sum(able.values(), jnp.zeros((3, 3))))
+    return {name: own @ whole for name, own in able.items()}
+
+
+def _rates(satellite, rate, pose, state, now, rates, a) -> dict[tuple[str, str], Array]:
+    """dx/dt by parts."""
+    bus, layout = now.motions[BUS], now.layout
+    R_B, bus_speed = bus.R_AX, bus.v - cross(rate, state.bus.p_NX_N)
+    a_B, dw_B = a[layout.rows(BUS)].reshape(2, 3)
+    found = {
+        ("attitude", BUS): state.bus.w_NX_X - R_B.T @ rate,
+        ("rate", BUS): R_B.T @ dw_B,
+        ("velocity", BUS): a_B - cross(rate, bus.v) - cross(rate, bus_speed),
+        ("position", BUS): bus_speed,
+    }
+    for name in satellite.free:
+        if name == BUS:
+            continue
+        body = now.motions[name]
+        dv, dw = a[layout.rows(name)].reshape(2, 3)
+        v_rel = body.v - bus.v
+        turning = _turning(rate, bus, body)
+        found["position", name] = turning
+        found["attitude", name] = body.w - rate
+        found["velocity", name] = dv - a_B - cross(rate, v_rel) - cross(rate, turning)
+        found["rate", name] = dw - cross(rate, body.w)
+    for name in pose.own:
+        own = state.own[name]
+        found["q", name], found["u", name] = own.u, a[layout.own(name)]
+        found["y", name], found["y_rate", name] = own.y_rate - pose.own[name].y_rate, rates[name].y
+        found["z", name] = rates[name].z
+    return found
+
+
+def _turning(rate, bus, body):
+    """Velocity of a body's origin relative to the bus's, seen in the turning frame."""
+    return body.v - bus.v - cross(rate, body.p - bus.p)
+
+
+def _outputs(
+    satellite, rate, pose, state, now, rates, a, moved, points
+) -> dict[str, Float[Array, " k"]]:
+    """Outputs by the names of their components' common part."""
+    bus, layout = now.motions[BUS], now.layout
+    found: dict[str, Array] = {}
+    found["bus_attitude"] = quaternion_to_rotation_vector(state.bus.q_NX)
+    names = [body.name for body in satellite.bodies if body.name != BUS]
+    quaternions = attitudes(satellite, state)
+    for name in names:
+        tilt = quaternion_multiply(quaternions[name], quaternion_conjugate(pose.q_BX[name]))
+        found[f"{name}_position"] = now.motions[name].p - bus.p - pose.p_BX_B[name]
+        found[f"{name}_attitude"] = quaternion_to_rotation_vector(tilt)
+    found["bus_rate"] = state.bus.w_NX_X - rate
+    for name in names:
+        found[f"{name}_velocity"] = _turning(rate, bus, now.motions[name])
+        found[f"{name}_rate"] = now.motions[name].w - rate
+    rows = state_rows(satellite, pose)
+    for key, labels in zip(rows.keys, rows.names, strict=True):
+        kind, name = key
+        if kind in ("q", "u", "y", "y_rate", "z") and labels:
+            value = getattr(state.own[name], kind) - getattr(pose.own[name], kind)
+            found |= {label: value[i][None] for i, label in enumerate(labels)}
+    found["bus_velocity"], found["bus_position"] = moved["position", BUS], state.bus.p_NX_N
+    report = [
+        output
+        for element in satellite.elements
+        for output in element.report(
+            now.around(element), rates_of(rates, element), layout.gathered(element, a)
+        )
+        if output.quantity.vibrates
+    ]
+    dimensions = {quantity.name: quantity.dimensions for quantity, _ in report}
+    for name, value in joined(report).items():
+        each = dimensions[name]
+        for index in np.ndindex(value.shape[: len(each) - (each[-1:] == AXIS)]):
+            found["_".join([name, *map(str, index)])] = jnp.atleast_1d(value[index])
+    R_B, w_B = bus.R_AX, bus.w
+    a_B, dw_B = a[layout.rows(BUS)].reshape(2, 3)
+    for name, p in {BUS: jnp.zeros(3), **points}.items():
+        r = R_B @ p
+        found[f"{name}_acceleration"] = R_B.T @ (a_B + cross(dw_B, r) + cross(w_B, cross(w_B, r)))
+    return found
+
+
+def _at_equilibrium(satellite, rate, pose, points):
+    """A, B, C, D where all bodies are in equilibrium, and the outputs' names.
+
+    Newton's method on poses, own coordinates and memories: struts may be preloaded, or in the field
+    of a steady turn.
+    """
+    rows = state_rows(satellite, pose)
+    free = [name for name in satellite.free if name != BUS]
+    unknown = rows.where(
+        *(key for name in free for key in (("position", name), ("attitude", name))),
+        *((kind, name) for name in pose.own for kind in ("q", "z")),
+    )
     for _ in range(NEWTON_STEPS):
-        matrices, rates = jax.device_get(_jacobians()(satellite, at, points))
-        unbalance = _plate_against_bus(rates)
-        if satellite.mount == "rigid":
-            unbalance[:] = 0.0
+        matrices, rates = jax.device_get(_jacobians()(satellite, rate, pose, points))
+        unbalance = _against_bus(rows, free, pose, rates)
         if np.all(np.abs(unbalance) < 1e-11):
             break
-        step = np.linalg.solve(_plate_against_bus(matrices[0])[:, 3:9], -unbalance)
-        satellite = _moved(satellite, step)
-    _check_equilibrium(rates[9:12], unbalance)
-    return tuple(np.array(matrix) for matrix in matrices)
+        step = np.linalg.solve(_against_bus(rows, free, pose, matrices[0])[:, unknown], -unbalance)
+        pose = _moved(
+            pose,
+            dict(zip(free, step[: 6 * len(free)].reshape(-1, 6), strict=True)),
+            step[6 * len(free) :],
+        )
+    _check_equilibrium(rates[rows.where(("rate", BUS))], unbalance)
+    names = _output_names(satellite, rate, pose, points)
+    return tuple(np.array(matrix) for matrix in matrices), names
 
 
-NEWTON_STEPS = 20
+def _output_names(satellite, rate, pose, points) -> tuple[str, ...]:
+    rows, inputs = state_rows(satellite, pose), input_rows(satellite)
+    x, u = jnp.zeros(len(rows.flat)), jnp.zeros(len(inputs.flat))
+    sizes: dict[str, int] = {}
+
+    def look():
+        _, outputs = _system(satellite, rate, pose, points, x, u)
+        sizes.update({name: len(value) for name, value in outputs.items()})
+
+    jax.eval_shape(look)
+    return tuple(
+        label for name, n in sizes.items() for label in (_axes(name) if n == 3 else (name,))
+    )
 
 
 @eqx.filter_jit
-def _moved(satellite, step):
-    """The satellite with another pose of its plate: displacement and rotation vector, bus axes."""
-    q_BP = quaternion_multiply(rotation_vector_to_quaternion(step[3:]), satellite.q_BP)
-    pose = (satellite.p_BP_B + step[:3], q_BP)
-    return eqx.tree_at(lambda s: (s.p_BP_B, s.q_BP), satellite, pose)
+def _moved(pose, steps, own_step):
+    """Other poses: displacements and rotation vectors of the bodies, bus axes, and own parts."""
+    p, q, own = dict(pose.p_BX_B), dict(pose.q_BX), dict(pose.own)
+    for name, step in steps.items():
+        q[name] = quaternion_multiply(rotation_vector_to_quaternion(step[3:]), q[name])
+        p[name] = p[name] + step[:3]
+    first = 0
+    for name, each in own.items():
+        m, n = len(each.q), len(each.z)
+        moved = (each.q + own_step[first : first + m], each.z + own_step[first + m : first + m + n])
+        own[name] = eqx.tree_at(lambda o: (o.q, o.z), each, moved)
+        first += m + n
+    return Pose(p, q, own)
 
 
-def _plate_against_bus(rows):
-    """Accelerations of the plate relative to the bus, from rows ordered as the state."""
-    return np.concatenate([rows[12:15], rows[15:18] - rows[9:12]])
+def _against_bus(rows: Rows, free: list[str], pose: Pose, values: np.ndarray) -> np.ndarray:
+    """Accelerations relative to the bus and own rates, from rows ordered as the state."""
+    bus = values[rows.where(("rate", BUS))]
+    found = [values[:0]]
+    for name in free:
+        found.append(values[rows.where(("velocity", name))])
+        found.append(values[rows.where(("rate", name))] - bus)
+    for name in pose.own:
+        found += [values[rows.where(("u", name))], values[rows.where(("z", name))]]
+    return np.concatenate(found)
 
 
 @functools.cache
@@ -427,22 +500,51 @@ def _jacobians():
     return eqx.filter_jit(_derivatives, compiler_options=options)  # type: ignore[call-overload]
 
 
-def _derivatives(satellite, at, points):
-    """A, B, C, D and dx/dt with the plate in the pose that is its nominal one here."""
-    n = len(satellite.cluster.rotor_mass)
-    moments = ClusterMoments.expand(satellite.cluster).averaged()
+def _derivatives(satellite, rate, pose, points):
+    """A, B, C, D and dx/dt in a pose."""
+    averaged = satellite.averaged()
 
     def system(x, u):
-        rates, outputs = _rates_and_outputs(satellite, moments, at, points, x, u)
-        return (rates, outputs), rates
+        rates, outputs = _system(averaged, rate, pose, points, x, u)
+        return (rates, jnp.concatenate(list(outputs.values()))), rates
 
-    x, u = jnp.zeros(24 + 2 * n), jnp.zeros(15 + 7 * n)
+    x = jnp.zeros(len(state_rows(satellite, pose).flat))
+    u = jnp.zeros(len(input_rows(satellite).flat))
     ((A, B), (C, D)), rates = jax.jacfwd(system, argnums=(0, 1), has_aux=True)(x, u)
     return (A, B, C, D), rates
 
 
+def platform_inertia(
+    satellite: Satellite, gimbal_angle: np.ndarray, name: str
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """Mass [kg], mass centre [m] and inertia about it [kg m^2] of a body with what it carries.
+
+    Its own axes, imbalance averaged over the rotors' turns.
+
+    Args:
+        gimbal_angle: (cmg,) of all units [rad].
+        name: of the body.
+    """
+    M = np.asarray(_carried_mass(satellite, jnp.asarray(gimbal_angle, float), name))
+    mass = M[0, 0]
+    center = np.array([M[5, 1], M[3, 2], M[4, 0]]) / mass
+    own = M[3:, 3:] - mass * (center @ center * np.eye(3) - np.outer(center, center))
+    return float(mass), center, own
+
+
+@eqx.filter_jit
+def _carried_mass(satellite, gimbal_angle, name):
+    """Mass matrix on the speeds of a body of itself and what it alone carries, its axes."""
+    satellite = satellite.averaged()
+    unit = jnp.array([1.0, 0.0, 0.0, 0.0])
+    state = initial_state(satellite, unit, jnp.zeros(3), gimbal_angle)
+    now = moving(satellite, jnp.zeros(()), state).along(name)
+    own = [e.mass(now.around(e)) for e in satellite.elements if e.hosts == (name,)]
+    return jnp.sum(jnp.stack(own), axis=0)
+
+
 def steering_commands(satellite: Satellite, gimbal_angle: np.ndarray | Array) -> np.ndarray:
-    """Gimbal rate or rotor torque commands (cmg, 3) by control torque, bus axes.
+    """Commands (command, 3) of all actuators by control torque, bus axes.
 
     Raises:
         OperatingPointError: steering gives no finite rates at these gimbal angles.
@@ -457,26 +559,26 @@ def steering_commands(satellite: Satellite, gimbal_angle: np.ndarray | Array) ->
     return commands
 
 
-SINGULAR = 1e9  # [rad/s per N m] gimbal rates for a torque, above which there is no steering
-
-
 @eqx.filter_jit
 def _steering_matrix(satellite, gimbal_angle):
-    axes, h_rms = torque_axes(satellite, gimbal_angle)
-    law = satellite.steering or PseudoInverse()
-    wanted = -quaternion_to_matrix(satellite.q_BP) / h_rms  # a row for each axis of the torque
-    commands = jax.vmap(lambda w: law.rates(axes, w, jnp.zeros(())))(wanted).T
-    drive = satellite.cluster.drive
-    if isinstance(drive, WheelMotors):
-        return commands * jnp.broadcast_to(drive.weights, len(commands))[:, None]
-    return commands
+    unit, zero = jnp.array([1.0, 0.0, 0.0, 0.0]), jnp.zeros(())
+    state = initial_state(satellite, unit, jnp.zeros(3), gimbal_angle)
+    actuators = Actuators(satellite.actuators, nominal_arounds(satellite, zero, state))
+    law: Steering = satellite.control.steering
+    law = law if law.acts else PseudoInverse()
+    axes = actuators.axes_B
+
+    def commands(torque):
+        return jnp.concatenate(actuators.split(law.rates(axes, torque / actuators.torque, zero)))
+
+    return jax.vmap(commands, out_axes=1)(jnp.eye(3))
 
 
-def _check_equilibrium(bus: np.ndarray, plate: np.ndarray) -> None:
-    if not np.all(np.abs(plate) < 1e-8):
+def _check_equilibrium(bus: np.ndarray, others: np.ndarray) -> None:
+    if not np.all(np.abs(others) < 1e-8):
         raise OperatingPointError(
             "the operating point is not an equilibrium: no pose of the plate was found in which "
-            f"the struts hold it; it would accelerate with {_listed(plate)} m/s^2, rad/s^2. "
+            f"the struts hold it; it would accelerate with {_listed(others)} m/s^2, rad/s^2. "
             "Expected struts whose free lengths fit the geometry, or a slower rate"
         )
     if not np.all(np.abs(bus) < 1e-8):

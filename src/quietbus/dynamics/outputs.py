@@ -1,98 +1,77 @@
-"""What a run reports at each output instant."""
+"""What a run reports at each output instant: all that bodies, elements and control tell."""
 
-import equinox as eqx
+from collections.abc import Iterable
+
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from quietbus.dynamics.closed_loop import control_signals, evaluate
-from quietbus.dynamics.equations import plate_motion
-from quietbus.dynamics.joint_forces import JointForces, joint_forces
-from quietbus.dynamics.kinematics import leg_motion
-from quietbus.dynamics.rotor_torques import rotor_torques
+from quietbus.dynamics.closed_loop import Evaluation, attitudes, evaluate
+from quietbus.dynamics.equations import moving, rates_of
 from quietbus.dynamics.state import State
-from quietbus.model.cmg import ClusterMoments
+from quietbus.model.body import body_quantities
+from quietbus.model.cluster import ROTOR_TORQUE
+from quietbus.model.report import Output, Quantity
 from quietbus.model.satellite import Satellite
-from quietbus.model.variants import balanced
 
-
-class Outputs(eqx.Module):
-    """Quantities at one instant; names, frames and units as in the results (``results.schema``)."""
-
-    bus_position: Float[Array, "3"]
-    bus_velocity: Float[Array, "3"]
-    bus_attitude: Float[Array, "4"]
-    bus_rate: Float[Array, "3"]
-    platform_position: Float[Array, "3"]
-    platform_velocity: Float[Array, "3"]
-    platform_attitude: Float[Array, "4"]
-    platform_rate: Float[Array, "3"]
-    gimbal_angle: Float[Array, " cmg"]
-    gimbal_rate: Float[Array, " cmg"]
-    leg_stroke: Float[Array, " leg"]
-    leg_force: Float[Array, " leg"]
-    control_torque: Float[Array, "3"]
-    attitude_error: Float[Array, "3"]
-    singularity_measure: Float[Array, ""]
-    joint_forces: JointForces | None
-    torque_share: Float[Array, ""] | None = None  # where the control makes units act
-    # where rotor speeds change:
-    rotor_angle: Float[Array, " cmg"] | None = None
-    rotor_speed: Float[Array, " cmg"] | None = None
-    rotor_torque: Float[Array, " cmg"] | None = None
+Outputs = dict[str, Float[Array, "..."]]
 
 
 def outputs(
-    satellite: Satellite,
-    t: Float[Array, ""],
-    state: State,
-    with_joint_forces: bool = False,
-    averaged: ClusterMoments | None = None,
+    satellite: Satellite, t: Float[Array, ""], state: State, detailed: bool = False
 ) -> Outputs:
-    """Outputs at time t [s]; joint forces and rotors' torques need the accelerations: they cost.
+    """Outputs at time t [s] by name; ``detailed``: with the forces in joints."""
+    found = evaluate(satellite, t, state)
+    return joined(told(satellite, state, found, detailed))
 
-    Args:
-        averaged: as of ``ClusterMoments.averaged``, if the state is the slow motion's.
-    """
-    signals = control_signals(satellite, t, state)
-    motion = leg_motion(satellite.legs, plate_motion(state))
-    joints, torque = None, None
-    if with_joint_forces or state.rotor is not None:
-        _, acceleration = evaluate(satellite, t, state, None, averaged)
-        if with_joint_forces:
-            joints = joint_forces(satellite, state, acceleration)
-        if state.rotor is not None:
-            shaken = satellite if averaged is None else balanced(satellite)
-            torque = rotor_torques(shaken, state, signals, acceleration)
-    return Outputs(
-        bus_position=state.p_NB_N,
-        bus_velocity=state.v_NB_N,
-        bus_attitude=state.q_NB,
-        bus_rate=state.w_NB_B,
-        platform_position=state.p_NP_N,
-        platform_velocity=state.v_NP_N,
-        platform_attitude=state.q_NP,
-        platform_rate=state.w_NP_P,
-        gimbal_angle=state.gimbal_angle,
-        gimbal_rate=state.gimbal_rate,
-        leg_stroke=motion.length - satellite.legs.nominal_length,
-        leg_force=satellite.legs.strut_force(motion.length, motion.length_rate),
-        control_torque=signals.torque_B,
-        attitude_error=signals.attitude_error_B,
-        singularity_measure=signals.singularity,
-        joint_forces=joints,
-        torque_share=signals.torque_share,
-        rotor_angle=None if state.rotor is None else state.rotor.angle,
-        rotor_speed=None if state.rotor is None else state.rotor.speed,
-        rotor_torque=torque,
-    )
+
+def quantities(satellite: Satellite, state: State, detailed: bool = False) -> dict[str, Quantity]:
+    """What the outputs are, by name."""
+    found: dict[str, Quantity] = {}
+
+    def look(satellite, state):
+        evaluation = evaluate(satellite, jnp.zeros(()), state)
+        for quantity, _ in told(satellite, state, evaluation, detailed):
+            found[quantity.name] = quantity
+
+    jax.eval_shape(look, satellite, state)
+    return found
+
+
+def told(
+    satellite: Satellite, state: State, found: Evaluation, detailed: bool = False
+) -> list[Output]:
+    """All outputs, those of like parts one after the other."""
+    report: list[Output] = []
+    now, turns = found.now, attitudes(satellite, state)
+    for body in satellite.bodies:
+        quantity, motion = body_quantities(body.name), now.motions[body.name]
+        report += [
+            Output(quantity["position"], motion.p),
+            Output(quantity["velocity"], motion.v),
+            Output(quantity["attitude"], turns[body.name]),
+            Output(quantity["rate"], motion.R_AX.T @ motion.w),
+        ]
+    for element in satellite.elements:
+        rates, u_rate = rates_of(found.rates, element), now.layout.gathered(element, found.u_rate)
+        report += element.report(now.around(element), rates, u_rate, detailed)
+    report += satellite.control.report(found.decision)
+    if all(cluster.rotors.steady for cluster in satellite.clusters):
+        report = [output for output in report if output.quantity != ROTOR_TORQUE]
+    return report
+
+
+def joined(report: Iterable[Output]) -> Outputs:
+    """Values by name, those of like parts one after the other."""
+    parts: dict[str, list[Array]] = {}
+    for quantity, value in report:
+        parts.setdefault(quantity.name, []).append(value)
+    return {
+        name: each[0] if len(each) == 1 else jnp.concatenate(each) for name, each in parts.items()
+    }
 
 
 def geometry_margin(satellite: Satellite, state: State) -> Float[Array, ""]:
-    """How far the legs are from where their geometry ends; zero or less there [-].
-
-    The smaller of: leg length over a tenth of its nominal value, less one; and the distance of
-    each universal joint from locking, ``1 - (k.s)^2 - 1e-3``.
-    """
-    motion = leg_motion(satellite.legs, plate_motion(state))
-    length = motion.length / (0.1 * satellite.legs.nominal_length) - 1.0
-    return jnp.minimum(jnp.min(length), jnp.min(1.0 - motion.kappa**2 - 1e-3))
+    """How far the satellite is from where some part's geometry ends [-]; zero or less there."""
+    now = moving(satellite, jnp.zeros(()), state)
+    return jnp.min(jnp.stack([e.margin(now.around(e)) for e in satellite.elements]))

@@ -3,25 +3,28 @@
 import equinox as eqx
 from jaxtyping import Array, Float
 
-from quietbus.model.rotor import RotorState
+from quietbus.model.element import Own
+
+
+class BodyState(eqx.Module):
+    """Pose and speed of a body X that moves on its own."""
+
+    p_NX_N: Float[Array, "3"]  # [m] origin of its frame; the bus's is its mass centre
+    q_NX: Float[Array, "4"]  # [-] attitude
+    v_NX_N: Float[Array, "3"]  # [m/s]
+    w_NX_X: Float[Array, "3"]  # [rad/s]
 
 
 class State(eqx.Module):
-    """Motion of bus, plate and gimbals, and the controller's memory.
+    """Motion of the free bodies, and what elements and control have of their own.
 
-    The legs add no freedom of their own: their two ends fix them. Angles of rotors that turn at
-    constant speed are a function of time.
+    Bodies that are welded to others add nothing, nor do legs: their two ends fix them.
     """
 
-    p_NB_N: Float[Array, "3"]  # [m] bus mass centre
-    q_NB: Float[Array, "4"]  # [-] bus attitude
-    p_NP_N: Float[Array, "3"]  # [m] plate origin
-    q_NP: Float[Array, "4"]  # [-] plate attitude
-    v_NB_N: Float[Array, "3"]  # [m/s]
-    w_NB_B: Float[Array, "3"]  # [rad/s]
-    v_NP_N: Float[Array, "3"]  # [m/s]
-    w_NP_P: Float[Array, "3"]  # [rad/s]
-    gimbal_angle: Float[Array, " cmg"]  # [rad]
-    gimbal_rate: Float[Array, " cmg"]  # [rad/s]
-    error_integral: Float[Array, "3"]  # [rad s] integral of the attitude error, bus frame
-    rotor: RotorState | None = None  # None: the rotors turn at constant speed
+    bodies: dict[str, BodyState]
+    own: dict[str, Own]
+
+    @property
+    def bus(self) -> BodyState:
+        """Motion of the controlled body."""
+        return self.bodies["bus"]

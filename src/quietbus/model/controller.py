@@ -1,11 +1,58 @@
 """Attitude control: the torque that the bus is to feel."""
 
+from typing import ClassVar
+
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 
-class PIDController(eqx.Module):
+class Measured(eqx.Module):
+    """What the attitude control knows of the bus, and what it is to be."""
+
+    error_B: Float[Array, "3"]  # [rad] twice the vector part of the shortest error quaternion
+    rate_error_B: Float[Array, "3"]  # [rad/s]
+    acceleration_ref_B: Float[Array, "3"]  # [rad/s^2] of the reference
+
+
+class AbstractController(eqx.Module):
+    """A law from attitude errors to the torque that the bus is to feel, with memory z."""
+
+    acts: ClassVar[bool] = True  # whether it asks for any torque
+
+    def start(self) -> Float[Array, " z"]:
+        """Memory at the start."""
+        return jnp.zeros(0)
+
+    def torque_B(self, measured: Measured, z: Float[Array, " z"]) -> Float[Array, "3"]:
+        """Torque asked for [N m], before any limit."""
+        raise NotImplementedError
+
+    def limited(self, torque_B: Float[Array, "3"]) -> Float[Array, "3"]:
+        """The torque within the limit, in its own direction."""
+        return torque_B
+
+    def memory_rate(
+        self,
+        measured: Measured,
+        z: Float[Array, " z"],
+        asked_B: Float[Array, "3"],
+        delivered_B: Float[Array, "3"],
+    ) -> Float[Array, " z"]:
+        """dz/dt, given the torques asked for and delivered [N m]."""
+        return jnp.zeros_like(z)
+
+
+class NoController(AbstractController):
+    """The satellite is left to itself."""
+
+    acts: ClassVar[bool] = False
+
+    def torque_B(self, measured, z):
+        return jnp.zeros(3)
+
+
+class PIDController(AbstractController):
     """PID on the attitude error, with back-calculation against integrator windup.
 
         T = -(Kp e + Ki q + Kd (w - w_ref)) + J dw_ref/dt
@@ -22,57 +69,18 @@ class PIDController(eqx.Module):
     kd: Float[Array, ""]  # [N m s/rad]
     J_feedforward_B: Float[Array, "3 3"]  # [kg m^2] inertia for the slew's feedforward torque
     unwinding: Float[Array, ""]  # [rad/(N m)] 1/(Ki T_t)
-    torque_limit: Float[Array, ""] | None  # [N m] on the norm of T
+    torque_limit: Float[Array, ""]  # [N m] on the norm of T, infinite without
 
-    def torque_B(
-        self,
-        error_B: Float[Array, "3"],
-        integral_B: Float[Array, "3"],
-        rate_error_B: Float[Array, "3"],
-        acceleration_ref_B: Float[Array, "3"],
-    ) -> Float[Array, "3"]:
-        """Torque asked for [N m], before any limit."""
-        feedback = self.kp * error_B + self.ki * integral_B + self.kd * rate_error_B
-        return self.J_feedforward_B @ acceleration_ref_B - feedback
+    def start(self):
+        return jnp.zeros(3)
 
-    def limited(self, torque_B: Float[Array, "3"]) -> Float[Array, "3"]:
-        """The torque within the limit, in its own direction."""
-        if self.torque_limit is None:
-            return torque_B
-        square = torque_B @ torque_B / self.torque_limit**2
-        return torque_B / jnp.sqrt(jnp.maximum(1.0, square))
+    def torque_B(self, measured, z):
+        feedback = self.kp * measured.error_B + self.ki * z + self.kd * measured.rate_error_B
+        return self.J_feedforward_B @ measured.acceleration_ref_B - feedback
 
-    def integral_rate(
-        self,
-        error_B: Float[Array, "3"],
-        asked_B: Float[Array, "3"],
-        delivered_B: Float[Array, "3"],
-    ) -> Float[Array, "3"]:
-        """dq/dt [rad]."""
-        return error_B + self.unwinding * (asked_B - delivered_B)
+    def limited(self, torque_B):
+        share = torque_B / self.torque_limit  # no square of the limit, which may be infinite
+        return torque_B / jnp.sqrt(jnp.maximum(1.0, share @ share))
 
-
-class GimbalServo(eqx.Module):
-    """First-order gimbal-rate servo with rate and acceleration limits."""
-
-    bandwidth: Float[Array, ""] | Float[Array, " cmg"]  # [rad/s] of all, or of each
-    rate_limit: Float[Array, ""] | None  # [rad/s]
-    acceleration_limit: Float[Array, ""] | None  # [rad/s^2]
-
-    def share(self, rate_command: Float[Array, " cmg"]) -> Float[Array, ""]:
-        """Largest factor up to 1 that brings every commanded rate within the limit.
-
-        All rates are cut alike, so the torque keeps its direction.
-        """
-        if self.rate_limit is None:
-            return jnp.ones(())
-        return 1.0 / jnp.maximum(1.0, jnp.max(jnp.abs(rate_command)) / self.rate_limit)
-
-    def acceleration(
-        self, rate_command: Float[Array, " cmg"], rate: Float[Array, " cmg"]
-    ) -> Float[Array, " cmg"]:
-        """Gimbal accelerations [rad/s^2]."""
-        acceleration = self.bandwidth * (rate_command - rate)
-        if self.acceleration_limit is None:
-            return acceleration
-        return jnp.clip(acceleration, -self.acceleration_limit, self.acceleration_limit)
+    def memory_rate(self, measured, z, asked_B, delivered_B):
+        return measured.error_B + self.unwinding * (asked_B - delivered_B)

@@ -1,11 +1,14 @@
-"""External forces and torques over time, on the bus or on the upper plate."""
+"""External forces and torques over time, on a body."""
 
 import abc
-from typing import Literal
+from typing import ClassVar, Literal
 
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
+
+from quietbus.model.element import AbstractElement
+from quietbus.spatial.vector import cross, rotate
 
 
 class Profile(eqx.Module):
@@ -74,25 +77,25 @@ class Table(Profile):
         return self.times
 
 
-class Load(eqx.Module):
+class Load(AbstractElement):
     """One force and torque, applied at a point of a body, following a profile."""
 
-    body: Literal["bus", "plate"] = eqx.field(static=True)
+    name: str = eqx.field(static=True)
+    hosts: tuple[str] = eqx.field(static=True)
     frame: Literal["body", "inertial"] = eqx.field(static=True)  # of force and torque
     force: Float[Array, "3"]  # [N]
     torque: Float[Array, "3"]  # [N m]
     point: Float[Array, "3"]  # [m] where the force acts, body frame
     profile: Profile
+    external: ClassVar[bool] = True
 
-    def wrench(
-        self, t: Float[Array, ""], R_NX: Float[Array, "3 3"]
-    ) -> tuple[Float[Array, "3"], Float[Array, "3"]]:
-        """Force [N] and torque about the body frame's origin [N m], inertial components.
+    def balance(self, around, rates, u_rate):
+        (body,) = around.hosts
+        R = body.R_AX if self.frame == "body" else around.R_AN
+        factor = self.profile.factor(around.t)
+        force = factor * rotate(R, self.force)
+        torque = factor * rotate(R, self.torque) + cross(rotate(body.R_AX, self.point), force)
+        return jnp.concatenate([force, torque])
 
-        Args:
-            R_NX: attitude of the loaded body.
-        """
-        R = R_NX if self.frame == "body" else jnp.eye(3)
-        factor = self.profile.factor(t)
-        force = factor * (R @ self.force)
-        return force, factor * (R @ self.torque) + jnp.cross(R_NX @ self.point, force)
+    def corners(self):
+        return self.profile.corners

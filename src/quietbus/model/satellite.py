@@ -1,35 +1,103 @@
 """The whole satellite as one pytree of parameters."""
 
-from typing import Literal
+from dataclasses import replace
 
 import equinox as eqx
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from quietbus.model.body import Bus, Plate
-from quietbus.model.cmg import ControlMomentGyro
-from quietbus.model.controller import GimbalServo, PIDController
-from quietbus.model.disturbance import Disturbance
-from quietbus.model.gimbal_motor import GimbalMotor
-from quietbus.model.guidance import Guidance
-from quietbus.model.hexapod import Hexapod
-from quietbus.model.load import Load
-from quietbus.model.steering import Steering
+from quietbus.model.alike import of_each
+from quietbus.model.body import Body, Mount
+from quietbus.model.cluster import Cluster
+from quietbus.model.control import Control
+from quietbus.model.element import AbstractActuator, AbstractElement
+from quietbus.model.legs.hexapod import Hexapod
+from quietbus.model.motion import Motion
+
+BUS = "bus"
+CONTROL = "control"  # name of the control's own part of the state
 
 
 class Satellite(eqx.Module):
-    """Parameters of bus, platform, CMGs and control; nothing in it changes during a run."""
+    """Parameters of all parts; nothing in it changes during a run."""
 
-    bus: Bus
-    plate: Plate
-    legs: Hexapod
-    cluster: ControlMomentGyro  # every field with a leading axis of units
-    p_BP_B: Float[Array, "3"]  # [m] origin of P in its nominal pose
-    q_BP: Float[Array, "4"]  # [-] attitude of P in its nominal pose
-    servo: GimbalServo
-    guidance: Guidance
-    controller: PIDController | None  # None: no control torque
-    steering: Steering | None  # None: gimbals held
-    loads: tuple[Load, ...]
-    mount: Literal["isolated", "rigid"] = eqx.field(static=True)
-    disturbance: Disturbance | None = None  # of the rotors, beyond their imbalance
-    motor: GimbalMotor | None = None  # None: gimbals move exactly as their servos say
+    bodies: tuple[Body, ...]  # the bus first
+    mounts: tuple[Mount, ...]  # of every body but the bus, its base's before its own
+    hexapods: tuple[Hexapod, ...]
+    clusters: tuple[Cluster, ...]
+    others: tuple[AbstractElement, ...]  # loads, and parts of users' own kinds
+    control: Control
+
+    @property
+    def elements(self) -> tuple[AbstractElement, ...]:
+        """All that gives to the equations of motion."""
+        return (*self.bodies, *self.hexapods, *self.clusters, *self.others)
+
+    @property
+    def actuators(self) -> tuple[AbstractActuator, ...]:
+        """What the control commands, in its order."""
+        named = {element.name: element for element in (*self.clusters, *self.others)}
+        return tuple(named[name] for name in self.control.actuators)  # type: ignore[misc]
+
+    @property
+    def bus(self) -> Body:
+        """The controlled body."""
+        return self.bodies[0]
+
+    @property
+    def count(self) -> int:
+        """Number of CMGs and wheels."""
+        return sum(cluster.count for cluster in self.clusters)
+
+    @property
+    def rotor_speed(self) -> Float[Array, " cmg"]:
+        """Nominal speeds of all rotors [rad/s]."""
+        return jnp.concatenate([jnp.zeros(0), *(c.units.rotor_speed for c in self.clusters)])
+
+    @property
+    def rotor_phase(self) -> Float[Array, " cmg"]:
+        """Angles of all rotors at t = 0 [rad]."""
+        return jnp.concatenate([jnp.zeros(0), *(c.units.rotor_phase for c in self.clusters)])
+
+    @property
+    def steered(self) -> tuple[int, ...]:
+        """Numbers of the units whose gimbals turn."""
+        has = [cluster.cut > 0 for cluster in self.clusters for _ in range(cluster.count)]
+        return tuple(j for j, turns in enumerate(has) if turns)
+
+    @property
+    def held(self) -> bool:
+        """Whether all bodies are one with the bus."""
+        return len(self.free) == 1
+
+    def body(self, name: str) -> Body:
+        """A body by its name."""
+        return next(body for body in self.bodies if body.name == name)
+
+    def mount(self, name: str) -> Mount:
+        """How a body stands on its base."""
+        return next(mount for mount in self.mounts if mount.body == name)
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the bodies that move on their own."""
+        welded = {mount.body for mount in self.mounts if mount.welded}
+        return tuple(body.name for body in self.bodies if body.name not in welded)
+
+    def nominal(self) -> dict[str, Motion]:
+        """Pose of all bodies in the bus, at rest, along bus axes."""
+        zero = jnp.zeros(3)
+        found = {BUS: Motion(jnp.eye(3), zero, zero, zero)}
+        for mount in self.mounts:
+            found[mount.body] = mount.motion(found[mount.base])
+        return found
+
+    def prepared(self) -> "Satellite":
+        """Itself with what evaluation needs again and again computed once."""
+        moments = of_each(lambda cluster: cluster.moments, self.clusters)
+        pairs = zip(self.clusters, moments, strict=True)
+        return replace(self, clusters=tuple(replace(c, kept=kept) for c, kept in pairs))
+
+    def averaged(self) -> "Satellite":
+        """The satellite of the slow motion: without what its rotors and gimbal motors shake."""
+        return replace(self, clusters=tuple(cluster.averaged() for cluster in self.clusters))

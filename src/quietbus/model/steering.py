@@ -1,43 +1,55 @@
-"""Steering laws: gimbal rates that change the cluster's momentum as asked.
+"""Steering laws: which commands of all actuators together give a torque.
 
-``A`` (3 x n) holds dh/dgamma of each unit, divided by the units' root-mean-square momentum, so
-that thresholds mean the same for every size of CMG. ``det(A A^T)`` falls to zero at a singular set
-of gimbal angles; the singularity measure is its square root.
+``A`` (3 x n) holds the torques by full commands of gimbals and wheels, divided by their
+root-mean-square, so that thresholds mean the same for every size of actuator. ``det(A A^T)`` falls
+to zero where some torque cannot be had; the singularity measure is its square root.
 """
 
 import abc
+from typing import ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 
-def singularity_measure(A: Float[Array, "3 cmg"]) -> Float[Array, ""]:
+def singularity_measure(A: Float[Array, "3 command"]) -> Float[Array, ""]:
     """``sqrt(det(A A^T))`` [-]; zero where some torque direction cannot be had."""
     return jnp.sqrt(jnp.maximum(_determinant(A @ A.T), 0.0))
 
 
 class Steering(eqx.Module):
-    """A law that answers a wanted momentum rate with gimbal rates."""
+    """A law that answers a wanted torque with commands."""
+
+    acts: ClassVar[bool] = True  # whether it gives any commands
 
     @abc.abstractmethod
     def rates(
-        self, A: Float[Array, "3 cmg"], momentum_rate: Float[Array, "3"], t: Float[Array, ""]
-    ) -> Float[Array, " cmg"]:
-        """Gimbal rates [rad/s].
+        self, A: Float[Array, "3 command"], torque: Float[Array, "3"], t: Float[Array, ""]
+    ) -> Float[Array, " command"]:
+        """Commands in shares of full ones [-].
 
         Args:
-            A: (3, cmg) momentum derivatives over the units' RMS momentum [1/rad].
-            momentum_rate: (3,) wanted dh/dt over the same momentum [1/s].
+            A: (3, command) torques by full commands, over their RMS [-].
+            torque: (3,) wanted, over the same RMS [-].
             t: time [s].
         """
+
+
+class NoSteering(Steering):
+    """No commands: gimbals stay where they are, and wheels keep their speeds."""
+
+    acts: ClassVar[bool] = False
+
+    def rates(self, A, torque, t):
+        return jnp.zeros(A.shape[1])
 
 
 class PseudoInverse(Steering):
     """Moore-Penrose: ``A^T (A A^T)^-1``; exact where it exists, without bound near singularity."""
 
-    def rates(self, A, momentum_rate, t):
-        return A.T @ _inverse(A @ A.T) @ momentum_rate
+    def rates(self, A, torque, t):
+        return A.T @ _inverse(A @ A.T) @ torque
 
 
 class SingularityRobust(Steering):
@@ -51,10 +63,10 @@ class SingularityRobust(Steering):
     lambda0: Float[Array, ""]  # [-]
     mu: Float[Array, ""]  # [-]
 
-    def rates(self, A, momentum_rate, t):
+    def rates(self, A, torque, t):
         AAt = A @ A.T
         weight = self.lambda0 * jnp.exp(-self.mu * _determinant(AAt))
-        return A.T @ _inverse(AAt + weight * jnp.eye(3)) @ momentum_rate
+        return A.T @ _inverse(AAt + weight * jnp.eye(3)) @ torque
 
 
 class GeneralizedSingularityRobust(Steering):
@@ -72,12 +84,12 @@ class GeneralizedSingularityRobust(Steering):
     frequency: Float[Array, ""]  # [rad/s]
     phases: Float[Array, "3"]  # [rad]
 
-    def rates(self, A, momentum_rate, t):
+    def rates(self, A, torque, t):
         AAt = A @ A.T
         weight = self.lambda0 * jnp.exp(-self.mu * _determinant(AAt))
         e1, e2, e3 = self.epsilon0 * jnp.sin(self.frequency * t + self.phases)
         E = jnp.array([[1.0, e3, e2], [e3, 1.0, e1], [e2, e1, 1.0]])
-        return A.T @ _inverse(AAt + weight * E) @ momentum_rate
+        return A.T @ _inverse(AAt + weight * E) @ torque
 
 
 def _determinant(S: Float[Array, "3 3"]) -> Float[Array, ""]:

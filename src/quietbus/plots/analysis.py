@@ -230,7 +230,7 @@ def gain_by_height(study: Study) -> Figure:
     if study.pid is None or study.loop_analyses is None:
         explain(axes, NO_LOOP)
         return figure
-    here = float(study.satellite.p_BP_B[2])
+    here = float(study.satellite.mounts[0].p_BX_B[2])
     reach = 1.5 * max(abs(here), 0.6)
     near = np.geomspace(0.005, 0.1, 8) * reach  # where the limit changes fast
     heights = np.unique(np.concatenate([np.linspace(-reach, reach, 41), near, [here]]))

@@ -44,7 +44,9 @@ def geometry_figures(scenario: Scenario) -> dict[str, Figure]:
 
 def platform(scenario: Scenario, placed: Layout) -> Figure:
     """Three views and a perspective of plates, legs, units and momentum."""
-    mount = "" if scenario.isolator.mount == "isolated" else ", rigid mount: legs not in use"
+    site, several = scenario.sites[0], len(scenario.sites) > 1
+    mount = "" if site.isolator.mount == "isolated" else ", rigid mount: legs not in use"
+    mount = f", {site.name}, the first of {len(scenario.sites)}{mount}" if several else mount
     figure = new_figure(7.6, f"Platform, bus frame ({scenario.name}{mount})")
     around, reach = _extent(placed)
     grid = figure.add_gridspec(2, 2, height_ratios=(1.0, 0.62), wspace=0.2)
@@ -143,7 +145,7 @@ def units(scenario: Scenario, placed: Layout) -> Figure:
         _units(pane, placed, reach)
         pane.bound([*ends, *placed.upper_B], 0.05 * placed.size)
         pane.finish(points.mean(axis=0))
-    pyramid = scenario.cluster.pyramid
+    pyramid = scenario.units.blocks[0].pyramid
     said = ""
     if pyramid is not None:
         leaning = "spin" if wheels else "gimbal"
@@ -164,7 +166,7 @@ def _plates(pane: Pane, placed: Layout) -> None:
 
 
 def _legs(pane: Pane, scenario: Scenario, placed: Layout, named: bool = True) -> None:
-    held = scenario.isolator.mount == "rigid"
+    held = scenario.sites[0].isolator.mount == "rigid"
     for i, (a, u) in enumerate(zip(placed.lower_B, placed.upper_B, strict=True)):
         look = {"linestyle": DASHES[1], "alpha": 0.5} if held else {}
         label = ("legs, not in use on a rigid mount" if held else "legs") if i == 0 else None

@@ -31,7 +31,7 @@ def jitter_figures(study: JitterStudy) -> dict[str, Figure]:
     """All pictures of a study by name; without jitter they say so. ``worst`` needs gimbals."""
     with style():
         figures = {"spectrum": spectrum(study), "budget": budget(study)}
-        if not study.wheels:
+        if not study.held:
             figures["worst"] = worst(study)
         if study.noise("isolated") is not None:
             figures["noise"] = noise(study)
@@ -45,7 +45,7 @@ def spectrum(study: JitterStudy) -> Figure:
         mount: RotorLines(
             np.rad2deg(1.0) * study.bus_rate(mount),
             study.frequency,
-            np.outer(study.satellite(mount).cluster.rotor_phase, study.orders),
+            np.outer(study.satellite(mount).rotor_phase, study.orders),
             study.orders,
         )
         for mount in LINES

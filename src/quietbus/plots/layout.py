@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from quietbus.scenario import Scenario
-from quietbus.scenario.wheels import WheelCluster
+from quietbus.scenario.blocks import Blocks
 
 
 @dataclass(frozen=True)
@@ -48,27 +47,30 @@ class Layout:
 
 
 def layout(scenario: Scenario) -> Layout:
-    """Positions and directions of a scenario's parts, gimbals at their angles at the start."""
-    isolator, cluster = scenario.isolator, scenario.cluster
+    """Positions and directions of a scenario's parts, gimbals at their angles at the start.
+
+    Of several platforms the first.
+    """
+    site = scenario.sites[0]
+    isolator, blocks = site.isolator, Blocks(site.blocks)
     R_BD = _rotation(isolator.orientation)
     p_BD_B = np.array(isolator.offset)
     lower, upper = isolator.joints()
     p_BP_B = p_BD_B + R_BD @ np.array([0.0, 0.0, isolator.separation])
-    wheels = isinstance(cluster, WheelCluster)
-    angles = cluster.gimbal_angles or (0.0,) * cluster.count
     units = []
-    placed: tuple[Any, ...] = cluster.placed()
-    for unit, angle in zip(placed, angles, strict=True):
+    for unit, angle, turns in zip(
+        blocks.placed(), blocks.gimbal_angles, blocks.turning, strict=True
+    ):
         g, s = np.array(unit.gimbal_axis), np.array(unit.spin_axis)
-        turned = s if wheels else np.cos(angle) * s + np.sin(angle) * np.cross(g, s)
+        turned = s if not turns else np.cos(angle) * s + np.sin(angle) * np.cross(g, s)
         momentum = unit.rotor.inertia[0, 0] * unit.rotor.speed * turned
         units.append(
             UnitLayout(
                 p_BP_B + R_BD @ np.array(unit.position),
-                None if wheels else R_BD @ g,
+                R_BD @ g if turns else None,
                 R_BD @ turned,
                 R_BD @ momentum,
-                0.0 if wheels else angle,
+                float(angle),
             )
         )
     return Layout(

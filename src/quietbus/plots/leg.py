@@ -19,7 +19,7 @@ LOWER, UPPER, STRUT = COLOURS[0], COLOURS[2], COLOURS[1]
 
 def leg_figure(scenario: Scenario, placed: Layout, leg: int = 0) -> Figure:
     """A leg to scale along its axis; what lies across it is a symbol."""
-    legs = scenario.isolator.legs
+    legs = scenario.sites[0].isolator.legs
     own = {
         name: value[leg] if isinstance(value := getattr(legs, name), tuple) else value
         for name in type(legs).model_fields

@@ -35,7 +35,6 @@ from quietbus.results.motion import (
     rate_spectrum,
     rotor_frequencies,
 )
-from quietbus.scenario.wheels import WheelCluster
 
 TIME = "time [s]"
 START = 0.2  # of a run: what settles within it is shown enlarged too
@@ -186,7 +185,7 @@ def unit_figures(run: xr.Dataset) -> dict[str, Figure]:
     figures = {}
     if has_gimbals(run):
         figures["gimbals"] = gimbals(run)
-    if "rotor_speed" in run:
+    if "rotor_torque" in run:
         figures["rotors"] = rotors(run)
     return figures
 
@@ -202,10 +201,7 @@ def rotors(run: xr.Dataset) -> Figure:
         ],
         "CMG" if has_gimbals(run) else "wheel",
     )
-    cluster = scenario_of(run).cluster
-    if not isinstance(cluster, WheelCluster):
-        return figure
-    motors = [wheel.motor for wheel in cluster.placed()]
+    motors = [wheel.motor for _, wheel in scenario_of(run).units.wheels]
     for axes, name, factor in zip(figure.axes, ("speed", "torque"), (RPM, 1.0), strict=True):
         limits = [getattr(motor, f"{name}_limit") for motor in motors]
         for limit in {factor * limit for limit in limits if limit is not None}:

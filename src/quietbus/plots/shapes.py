@@ -52,8 +52,9 @@ def mode_shapes(study: Study) -> Figure:
 
 def _draw(axes: Axes, study: Study, mode: Mode, plane: tuple[int, int]) -> None:
     """One view: ``plane`` has the indices of the horizontal and the vertical axis."""
-    legs, p_BP = study.satellite.legs, np.asarray(study.satellite.p_BP_B)
-    arms = np.asarray(legs.p_PU_P) @ np.asarray(quaternion_to_matrix(study.satellite.q_BP)).T
+    legs, mount = study.satellite.hexapods[0].geometry, study.satellite.mounts[0]
+    p_BP = np.asarray(mount.p_BX_B)
+    arms = np.asarray(legs.p_PU_P) @ np.asarray(quaternion_to_matrix(mount.q_BX)).T
     lower, upper = np.asarray(legs.p_BA_B), p_BP + arms
     tops = mode.shape[:3] + np.cross(mode.shape[3:6], arms)
     feet = mode.shape[6:9] + np.cross(mode.shape[9:], lower)

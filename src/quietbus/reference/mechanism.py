@@ -146,6 +146,7 @@ def _legs(legs: Data, number: int, R_BD: np.ndarray, offset: np.ndarray, above: 
         keys = ("mass", "distance", "transverse_inertia", "axial_inertia")
         return LegParts(*(np.array([part[key] for part in of_legs]) for key in keys))
 
+    strut = legs.get("strut") or legs  # spring and damper, under the key or beside the joints
     free = legs.get("free_length")
     if free is None:  # without force in the nominal pose
         free = list(np.linalg.norm(upper + above - lower, axis=1))
@@ -155,8 +156,8 @@ def _legs(legs: Data, number: int, R_BD: np.ndarray, offset: np.ndarray, above: 
         lower_joint_Y=np.array([offset + R_BD @ joint for joint in lower]),
         upper_joint_X=upper,
         axis_Y=np.array([R_BD @ axis for axis in np.array(legs["universal_axes"])]),
-        stiffness=each(legs["stiffness"]),
-        damping=each(legs["damping"]),
+        stiffness=each(strut["stiffness"]),
+        damping=each(strut["damping"]),
         free_length=each(free),
         lower=parts(legs["lower_part"]),
         upper=parts(legs["upper_part"]),

@@ -10,7 +10,7 @@ from quietbus.plain import RPM
 from quietbus.plots.signals import ANGLES, AXES
 from quietbus.report.harmonic import harmonic_pictures
 from quietbus.report.lines import GREY, Drawing, Panel, Picture, decimate, finished, line_look
-from quietbus.results import aliasing, has_gimbals, method_of, scenario_of
+from quietbus.results import aliasing, has_gimbals, method_of, rate_of, scenario_of
 from quietbus.results.envelope import jitter_over_time
 from quietbus.results.motion import degrees, euler_angles, jitter, rate_spectrum, rotor_frequencies
 
@@ -50,7 +50,7 @@ def _parts(run: xr.Dataset) -> Iterator[Drawing | Picture]:
         yield _spectrum(run)
     if has_gimbals(run):
         yield _gimbals(run)
-    if "rotor_speed" in run:
+    if "rotor_torque" in run:
         yield _rotors(run)
     yield _struts(run)
     if "spherical_force" in run:
@@ -97,9 +97,12 @@ def _control(run: xr.Dataset) -> Drawing:
 def _rates(run: xr.Dataset) -> Drawing:
     panels = [Panel("bus", "deg/s", degrees(run, "bus_rate"), AXES)]
     caption = "Angular velocity of the bus in inertial space, bus frame."
-    if run.attrs["mount"] != "rigid":
-        panels.append(Panel("platform", "deg/s", degrees(run, "platform_rate"), AXES))
-        caption += " Below, of the upper plate, which carries the CMGs; plate frame."
+    moving = [site for site in scenario_of(run).sites if site.isolator.mount != "rigid"]
+    for site in moving:
+        name = {"plate": "platform"}.get(site.name, site.name)
+        panels.append(Panel(name, "deg/s", degrees(run, rate_of(site.name)), AXES))
+    if moving:
+        caption += " Below, of what stands on struts, each along its own axes."
     if is_harmonic(run):
         caption += " The slow motion only: the jitter is in the next pictures."
     return Drawing("rates", "Rates", caption, run["time"].to_numpy(), panels)

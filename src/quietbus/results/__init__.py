@@ -8,10 +8,11 @@ from quietbus.results.origin import has_gimbals as has_gimbals
 from quietbus.results.origin import method_of as method_of
 from quietbus.results.origin import scenario_of as scenario_of
 from quietbus.results.schema import AXES as AXES
+from quietbus.results.schema import CHANGING_VARIABLES as CHANGING_VARIABLES
 from quietbus.results.schema import CONTROL_VARIABLES as CONTROL_VARIABLES
 from quietbus.results.schema import JOINT_VARIABLES as JOINT_VARIABLES
-from quietbus.results.schema import ROTOR_VARIABLES as ROTOR_VARIABLES
 from quietbus.results.schema import VARIABLES as VARIABLES
+from quietbus.results.schema import rate_of as rate_of
 from quietbus.results.signals import reconstruct as reconstruct
 from quietbus.results.summary import Summary as Summary
 from quietbus.results.summary import aliasing as aliasing

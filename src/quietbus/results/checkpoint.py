@@ -5,7 +5,6 @@ last record with the state reached. Each record carries its length and checksum,
 short, by a killed program or a full disk, is known and left out, and all before it count.
 """
 
-import dataclasses
 import io
 import json
 import os
@@ -13,7 +12,6 @@ import pathlib
 import stat
 import struct
 import time
-import typing
 import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -25,8 +23,8 @@ import numpy as np
 import xarray as xr
 
 from quietbus.build import build_satellite
-from quietbus.dynamics.outputs import Outputs
-from quietbus.dynamics.state import State
+from quietbus.dynamics.state import BodyState, State
+from quietbus.model.element import Own
 from quietbus.results.dataset import to_dataset
 from quietbus.results.task import Task, differences
 from quietbus.scenario import ScenarioError
@@ -135,7 +133,7 @@ class Checkpoint:
             _append(self.file, packed.getbuffer())
         except OSError as error:
             self.trouble = error.strerror or str(error)
-        self.rows = len(outputs.bus_rate)
+        self.rows = len(outputs["bus_rate"])
         self.written, self.reached = time.perf_counter(), None
 
     def close(self) -> None:
@@ -219,7 +217,7 @@ def to_run(found: Found, source: str) -> xr.Dataset:
         raise CheckpointError(f"{source}: a checkpoint that holds no output yet")
     scenario, reached = found.task.scenario, found.reached
     outputs, states = reached.kept
-    count = len(outputs.bus_rate)
+    count = len(outputs["bus_rate"])
     solution = Solution(
         np.arange(count) / scenario.simulation.output_rate,
         outputs,
@@ -234,7 +232,7 @@ def to_run(found: Found, source: str) -> xr.Dataset:
         return to_dataset(found.task, solution, found.wall_time)
     assert states is not None
     satellite, view = build_satellite(scenario), found.task.view()
-    jitter, _ = respond(satellite, solution.time, states, view)
+    jitter, _ = respond(satellite, solution, view)
     return to_dataset(found.task, HarmonicSolution(solution, jitter), found.wall_time)
 
 
@@ -272,10 +270,14 @@ def _joined(task: Task, parts: list[dict[str, np.ndarray]]) -> tuple[Reached | N
         for name in last
         if name.startswith(("outputs.", "states."))
     }
-    outputs = _tree(Outputs, whole, "outputs")
-    states = _tree(State, whole, "states") if task.method.jitter_apart else None
+    outputs: Any = {
+        name.removeprefix(_OUTPUTS): rows
+        for name, rows in whole.items()
+        if name.startswith(_OUTPUTS)
+    }
+    states = _state(whole, "states") if task.method.jitter_apart else None
     reached, step, steps, rejected, wall_time = last["numbers"].tolist()
-    state = jax.tree.map(jnp.asarray, _tree(State, last, "state"))
+    state = jax.tree.map(jnp.asarray, _state(last, "state"))
     kept = (outputs, states)
     return Reached(reached, step, state, int(steps), int(rejected), kept), wall_time
 
@@ -285,25 +287,22 @@ def _rows(tree: Any, start: int) -> Any:
 
 
 def _named(tree: Any, path: str) -> Iterator[tuple[str, np.ndarray]]:
-    """Arrays of a module by the paths of their fields."""
-    for each in dataclasses.fields(tree):
-        value, name = getattr(tree, each.name), f"{path}.{each.name}"
-        if dataclasses.is_dataclass(value):
-            yield from _named(value, name)
-        elif value is not None:
-            yield name, np.asarray(value)
+    """Arrays of a tree by the paths of their places in it."""
+    for keys, leaf in jax.tree_util.tree_leaves_with_path(tree):
+        names = (str(getattr(key, "key", getattr(key, "name", ""))) for key in keys)
+        yield ".".join((path, *names)), np.asarray(leaf)
 
 
-def _tree(kind: Any, arrays: Mapping[str, np.ndarray], path: str) -> Any:
-    """The module that ``_named`` took apart; fields without arrays are None."""
-    values: dict[str, Any] = {}
-    for each in dataclasses.fields(kind):
-        name = f"{path}.{each.name}"
-        inner = next(filter(dataclasses.is_dataclass, (each.type, *typing.get_args(each.type))), 0)
-        if inner and any(key.startswith(f"{name}.") for key in arrays):
-            values[each.name] = _tree(inner, arrays, name)
-        else:
-            if name not in arrays and type(None) not in typing.get_args(each.type):
-                raise KeyError(f"no {name}")
-            values[each.name] = arrays.get(name)
-    return kind(**values)
+_OUTPUTS = "outputs."
+
+
+def _state(arrays: Mapping[str, np.ndarray], path: str) -> State:
+    """The state that ``_named`` took apart; KeyError, ValueError for what is none."""
+    parts: dict[str, dict[str, dict[str, Any]]] = {"bodies": {}, "own": {}}
+    for name, value in arrays.items():
+        if name.startswith(f"{path}."):
+            kind, owner, field = name.removeprefix(f"{path}.").split(".")
+            parts[kind].setdefault(owner, {})[field] = value
+    bodies = {name: BodyState(**fields) for name, fields in parts["bodies"].items()}
+    own = {name: Own(**fields) for name, fields in parts["own"].items()}
+    return State(bodies, own)

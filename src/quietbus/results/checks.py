@@ -1,7 +1,7 @@
 """What a file must be to pass for a run: it may come from elsewhere, or be damaged."""
 
 import mmap
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from typing import Any, BinaryIO
 
 import h5py
@@ -10,7 +10,7 @@ import xarray as xr
 
 from quietbus.methods import METHODS
 from quietbus.results.origin import method_of, scenario_of
-from quietbus.results.schema import DIMENSIONS, JITTER_VARIABLES, VARIABLES, described
+from quietbus.results.schema import DIMENSIONS, described, jitter_variables_of, variables_of
 from quietbus.scenario import Scenario
 
 STATUSES = ("complete", "stopped", "interrupted")
@@ -75,18 +75,23 @@ def check_run(run: xr.Dataset) -> None:
     Raises:
         ValueError: all that is wrong with it, in one line.
     """
-    missing = {"time", *VARIABLES} - set(run.variables) or set(TEXTS) - set(run.attrs)
-    if missing:
-        raise ValueError(f"a NetCDF file, but not a run of quietbus: it has no {_list(missing)}")
+    _refuse_lack({"time", *variables_of(["bus"])} - set(run.variables))
+    _refuse_lack(set(TEXTS) - set(run.attrs))
     wrong = [*_attributes(run), *_time(run)]
     if not wrong:
         scenario = _scenario(run)
+        _refuse_lack(variables_of(scenario.bodies).keys() - set(run.variables))
         wrong += [*_sizes(run, scenario), *_variables(run)]
-    if not wrong and method_of(run).jitter_apart:
-        wrong += _harmonic(run)
+        if not wrong and method_of(run).jitter_apart:
+            wrong += _harmonic(run, scenario)
     if wrong:
         more = f"; and {len(wrong) - 5} more" if len(wrong) > 5 else ""
         raise ValueError(f"not a sound run of quietbus: {'; '.join(wrong[:5])}{more}")
+
+
+def _refuse_lack(missing: Set[Any]) -> None:
+    if missing:
+        raise ValueError(f"a NetCDF file, but not a run of quietbus: it has no {_list(missing)}")
 
 
 def _attributes(run: xr.Dataset) -> Iterator[str]:
@@ -94,7 +99,7 @@ def _attributes(run: xr.Dataset) -> Iterator[str]:
         if not isinstance(run.attrs.get(name, ""), str):
             yield f"its attribute {name} is no text"
     known: dict[str, tuple[str, ...]] = {
-        "mount": ("isolated", "rigid"),
+        "mount": ("isolated", "rigid", "mixed"),
         "method": tuple(METHODS),
         "status": STATUSES,
     }
@@ -122,19 +127,19 @@ def _scenario(run: xr.Dataset) -> Scenario:
     except ValueError as error:
         told = "; ".join(str(error).splitlines()[:3])
         raise ValueError(f"not a sound run of quietbus: {told}") from None
-    if scenario.isolator.mount != run.attrs["mount"]:
+    if scenario.mount != run.attrs["mount"]:
         raise ValueError(
             f"not a sound run of quietbus: its mount is {run.attrs['mount']}, that of its scenario "
-            f"{scenario.isolator.mount}"
+            f"{scenario.mount}"
         )
     return scenario
 
 
 def _sizes(run: xr.Dataset, scenario: Scenario) -> Iterator[str]:
     expected: dict[str, Any] = {name: labels for name, (_, labels, _) in DIMENSIONS.items()}
-    expected |= {"cmg": range(scenario.cluster.count), "leg": range(scenario.isolator.legs.count)}
+    expected |= {"cmg": range(scenario.units.count), "leg": range(scenario.legs)}
     if method_of(run).jitter_apart:
-        expected["order"] = scenario.cluster.orders
+        expected["order"] = scenario.units.orders
     for name, labels in expected.items():
         wanted = f"expected {len(labels)} of its scenario" if name in ("cmg", "leg") else "expected"
         if name not in run.coords:
@@ -166,9 +171,9 @@ def _variables(run: xr.Dataset) -> Iterator[str]:
                 yield f"{name}: expected unit quaternions"
 
 
-def _harmonic(run: xr.Dataset) -> Iterator[str]:
+def _harmonic(run: xr.Dataset, scenario: Scenario) -> Iterator[str]:
     """Amplitudes and phases of the outputs that every harmonic run has."""
-    for name, (inner, _, _) in JITTER_VARIABLES.items():
+    for name, (inner, _, _) in jitter_variables_of(scenario.bodies).items():
         if not {"point", "line"} & set(inner):
             for part in ("amplitude", "phase", "envelope", "worst_case", "rss", "rms"):
                 if f"{name}_jitter_{part}" not in run:

@@ -2,6 +2,7 @@
 
 import datetime
 import importlib.metadata
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -9,17 +10,15 @@ import xarray as xr
 
 from quietbus.analysis.jitter.combine import combine
 from quietbus.dynamics.outputs import Outputs
-from quietbus.results.origin import rotors, text_of
+from quietbus.model.report import Quantity
+from quietbus.results.origin import text_of
 from quietbus.results.schema import (
     COMBINED,
-    CONTROL_VARIABLES,
     DIMENSIONS,
-    JITTER_VARIABLES,
-    JOINT_VARIABLES,
     PAIRS,
-    ROTOR_VARIABLES,
-    VARIABLES,
+    jitter_of,
     per_hertz,
+    told,
 )
 from quietbus.results.task import Task
 from quietbus.scenario import Scenario
@@ -27,34 +26,30 @@ from quietbus.solve.direct import SLOW, Scheme, Solution
 from quietbus.solve.harmonic import HarmonicSolution, Jitter
 
 
-def to_dataset(task: Task, solution: Solution | HarmonicSolution, wall_time: float) -> xr.Dataset:
+def to_dataset(
+    task: Task,
+    solution: Solution | HarmonicSolution,
+    wall_time: float,
+    quantities: Mapping[str, Quantity] | None = None,
+) -> xr.Dataset:
     """A run as a dataset.
 
     Args:
         task: what the run was asked for.
         wall_time: [s].
+        quantities: that parts of users' own kinds tell, by name.
     """
     scenario, points, lines_of_sight = task.scenario, task.points, task.lines_of_sight
     jitter = solution.jitter if isinstance(solution, HarmonicSolution) else None
     if isinstance(solution, HarmonicSolution):
         solution = solution.slow
+    known = quantities or {}
     data = {
-        name: _variable(getattr(solution.outputs, name), *VARIABLES[name]) for name in VARIABLES
+        name: _variable(values, *told(name, known)) for name, values in solution.outputs.items()
     }
-    data |= {
-        name: _variable(getattr(solution.outputs, name), *description)
-        for name, description in (CONTROL_VARIABLES | ROTOR_VARIABLES).items()
-        if getattr(solution.outputs, name) is not None
-    }
-    joints = solution.outputs.joint_forces
-    if joints is not None:
-        data |= {
-            name: _variable(getattr(joints, name), *description)
-            for name, description in JOINT_VARIABLES.items()
-        }
     if jitter is not None:
         data |= _jitter_variables(scenario, solution, jitter)
-    counted = {"cmg": solution.outputs.gimbal_angle, "leg": solution.outputs.leg_stroke}
+    counted = {"cmg": solution.outputs["rotor_angle"], "leg": solution.outputs["leg_stroke"]}
     coordinates = {
         "time": ("time", solution.time, {"units": "s", "long_name": "time"}),
         **{
@@ -87,7 +82,7 @@ def to_dataset(task: Task, solution: Solution | HarmonicSolution, wall_time: flo
                 coordinates["pair"] = ("pair", list(PAIRS), {"long_name": "two components"})
         coordinates["order"] = (
             "order",
-            list(scenario.cluster.orders),
+            list(scenario.units.orders),
             {"long_name": "multiple of rotor speed"},
         )
         for dimension, named in (("point", points), ("line", lines_of_sight)):
@@ -98,9 +93,9 @@ def to_dataset(task: Task, solution: Solution | HarmonicSolution, wall_time: flo
     )
     scheme = Scheme() if jitter is None else SLOW
     attributes = {
-        "title": f"{scenario.name}, {scenario.isolator.mount}",
+        "title": f"{scenario.name}, {scenario.mount}",
         "scenario": text_of(scenario),
-        "mount": scenario.isolator.mount,
+        "mount": scenario.mount,
         "method": task.method.word,
         "status": status,
         "stop_reason": solution.stopped or "",
@@ -117,11 +112,10 @@ def to_dataset(task: Task, solution: Solution | HarmonicSolution, wall_time: flo
 
 
 def _rotor_lines(scenario: Scenario, outputs: Outputs) -> tuple[np.ndarray, np.ndarray]:
-    """Frequency and phase of each order (..., cmg, order), over time where speeds change."""
-    (speed, phase), orders = rotors(scenario), np.array(scenario.cluster.orders)
-    if outputs.rotor_speed is not None:
-        speed, phase = np.asarray(outputs.rotor_speed), np.asarray(outputs.rotor_angle)
-    return speed[..., None] * orders, phase[..., None] * orders
+    """Frequency and phase of each order (n, cmg, order)."""
+    orders = np.array(scenario.units.orders)
+    speed, angle = (np.asarray(outputs[name]) for name in ("rotor_speed", "rotor_angle"))
+    return speed[..., None] * orders, angle[..., None] * orders
 
 
 def _jitter_variables(scenario: Scenario, solution: Solution, jitter: Jitter) -> dict[str, Any]:
@@ -142,10 +136,10 @@ def _jitter_variables(scenario: Scenario, solution: Solution, jitter: Jitter) ->
             "rad",
             "estimated error of a line of sight's jitter, by change and by second order",
         )
-    for name, (inner, unit, meaning) in JITTER_VARIABLES.items():
-        values = jitter.amplitudes[name]
+    for name, values in jitter.amplitudes.items():
         if not values.size:
             continue
+        inner, unit, meaning = jitter_of(name)
         of = f"jitter of the {meaning}"
         dimensions = ("cmg", "order", *inner)
         data[f"{name}_jitter_amplitude"] = _variable(
@@ -194,7 +188,7 @@ def _jitter_variables(scenario: Scenario, solution: Solution, jitter: Jitter) ->
 def _turning_gimbals(scenario: Scenario, outputs: Outputs) -> tuple[np.ndarray, np.ndarray]:
     """Frequency [rad/s] and phase [rad] of each line (n, line) of the gimbal motors."""
     multiples = np.array(_ripple_lines(scenario))
-    gimbals = (np.asarray(outputs.gimbal_rate), np.asarray(outputs.gimbal_angle))
+    gimbals = (np.asarray(outputs[name]) for name in ("gimbal_rate", "gimbal_angle"))
     rate, angle = ((values[..., None] * multiples).reshape(len(values), -1) for values in gimbals)
     return rate, angle
 
@@ -217,10 +211,9 @@ def _ripple_variables(
     }
 
 
-def _ripple_lines(scenario: Scenario) -> tuple[int, ...]:
+def _ripple_lines(scenario: Scenario) -> tuple[float, ...]:
     """Multiples of the gimbal angle of the gimbal motors' lines, as of ``GimbalMotor.order``."""
-    motor = scenario.cluster.gimbal_motor
-    return motor.lines if motor else ()
+    return scenario.units.ripple
 
 
 def _variable(values, dimensions, unit, meaning):

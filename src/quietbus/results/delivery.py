@@ -4,7 +4,6 @@ import numpy as np
 import xarray as xr
 
 from quietbus.results.origin import scenario_of
-from quietbus.scenario.wheels import WheelCluster
 
 ENOUGH = 0.9  # of the torque asked for, less is told
 LONG = 1.0  # [s] if it lasts longer than this
@@ -38,14 +37,16 @@ def delivery_notes(run: xr.Dataset) -> list[str]:
 
 
 def _cause(stretch: xr.Dataset) -> str:
-    cluster = scenario_of(stretch).cluster
-    if isinstance(cluster, WheelCluster):
+    units = scenario_of(stretch).units
+    if not units.gimbals_turn:
         return "The wheels are at their torque or speed limits"
-    limit, fastest = cluster.gimbal_rate_limit, float(np.abs(stretch["gimbal_rate"]).max())
+    fastest = np.max(np.abs(stretch["gimbal_rate"].to_numpy()), axis=0)
     measure = float(stretch["singularity_measure"].min())
     said = []
-    if limit is not None and fastest > AT_LIMIT * limit:
+    if np.any(fastest > AT_LIMIT * units.gimbal_rate_limits):
         said.append("The gimbals are at their rate limit")
+    if units.wheels:
+        said.append("Wheels may be at their torque or speed limits")
     if not said or measure < NEAR:
         said.append(
             f"The gimbals are near a singular set (singularity_measure down to {measure:.2g}), "

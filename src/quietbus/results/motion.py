@@ -12,7 +12,7 @@ from quietbus.analysis.jitter.combine import SAME_FREQUENCY, combine
 from quietbus.analysis.signals.residual import residual
 from quietbus.analysis.signals.spectrum import Spectrum, amplitude_spectrum, detrended
 from quietbus.results import aliasing, method_of, scenario_of
-from quietbus.solve.harmonic import SLOW_CHANGE
+from quietbus.solve.validity import SLOW_CHANGE
 
 TREND = 1.0  # [s] of the end of a run over which the slow motion is fitted, as in its summary
 BLURRED = 6  # bins, half the main lobe of the spectrum's window
@@ -49,12 +49,9 @@ def rotor_frequencies(run: xr.Dataset) -> tuple[float, float]:
 
     Of rotors whose speed changes, at the end of the run that its spectrum is from.
     """
-    if "rotor_speed" in run:
-        time = run["time"].to_numpy()
-        last = time >= time[-1] - _spectrum_span(time)
-        speeds = np.abs(run["rotor_speed"].to_numpy()[last]).ravel().tolist()
-    else:
-        speeds = [abs(unit.rotor.speed) for unit in scenario_of(run).cluster.placed() if unit.rotor]
+    time = run["time"].to_numpy()
+    last = time >= time[-1] - _spectrum_span(time)
+    speeds = np.abs(run["rotor_speed"].to_numpy()[last]).ravel().tolist()
     turning = [speed / (2.0 * np.pi) for speed in speeds if speed] or [0.0]
     return min(turning), max(turning)
 
@@ -158,13 +155,8 @@ def last_lines(run: xr.Dataset) -> RotorLines:
         last[f"bus_rate_jitter_{part}"].transpose("cmg", "order", "axis").to_numpy()
         for part in ("amplitude", "phase")
     )
-    scenario = scenario_of(run)
-    units = scenario.cluster.placed()
     orders = last["order"].to_numpy()
-    speed = np.array([unit.rotor.speed if unit.rotor else 0.0 for unit in units])
-    phase = np.array(scenario.cluster.phases())
-    if "rotor_speed" in last:
-        speed, phase = last["rotor_speed"].to_numpy(), last["rotor_angle"].to_numpy()
+    speed, phase = last["rotor_speed"].to_numpy(), last["rotor_angle"].to_numpy()
     return RotorLines(
         np.rad2deg(amplitude) * np.exp(1j * shift),
         np.outer(speed, orders),

@@ -14,7 +14,6 @@ import xarray as xr
 
 from quietbus.methods import METHODS, Method
 from quietbus.scenario import Scenario
-from quietbus.scenario.wheels import WheelCluster
 from quietbus.words import shown
 
 MOST_LETTERS = 2_000_000  # of the texts whose scenarios are kept: of 800 ordinary ones, some 16 MB
@@ -39,9 +38,10 @@ def scenario_from(text: str, source: str) -> Scenario:
     known = _kept.get(text)
     if known is None:
         known = Scenario.from_yaml(text, source)
-        if "rotor_phases" not in known.cluster.model_fields_set:
+        old = [b for b in known.units.blocks if "rotor_phases" not in b.model_fields_set]
+        if old:
             # a run now says them always; one made before they were random by default had zeros
-            zeros = [0.0] * known.cluster.count
+            zeros = [0.0] * known.units.count
             known = known.with_overrides({"cluster.rotor_phases": zeros})
     _keep(text, known)
     return known
@@ -88,12 +88,9 @@ def method_of(run: xr.Dataset) -> type[Method]:
 
 def has_gimbals(run: xr.Dataset) -> bool:
     """Whether the units of a run are CMGs, and not reaction wheels."""
-    return not isinstance(scenario_of(run).cluster, WheelCluster)
+    return scenario_of(run).units.gimbals_turn
 
 
 def rotors(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
     """Speeds [rad/s] and phases [rad] of the rotors; zero where a unit has no rotor."""
-    units = scenario.cluster.placed()
-    speed = np.array([unit.rotor.speed if unit.rotor else 0.0 for unit in units])
-    phase = np.array(scenario.cluster.phases())
-    return speed, phase
+    return scenario.units.speeds, np.array(scenario.units.phases())

@@ -1,4 +1,15 @@
-"""What a run holds: names, dimensions, units and meanings of its variables."""
+"""What a run holds: names, dimensions, units and meanings of its variables.
+
+The parts of the satellite declare what they report (``model.report``); here are the tables of it.
+"""
+
+from collections.abc import Iterable, Mapping
+
+from quietbus.dynamics import views
+from quietbus.model import cluster, control
+from quietbus.model.body import body_quantities
+from quietbus.model.legs import hexapod
+from quietbus.model.report import Quantity
 
 AXES = ("x", "y", "z")
 PAIRS = ("yz", "zx", "xy")
@@ -6,75 +17,39 @@ DIMENSIONS = {
     "axis": ("axis", list(AXES), "component"),
     "quaternion": ("quaternion", ["w", "x", "y", "z"], "component, scalar first"),
 }
-# name: (dimensions after time, unit, meaning)
-VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
-    "bus_position": (("axis",), "m", "position of the bus mass centre, inertial frame"),
-    "bus_velocity": (("axis",), "m/s", "velocity of the bus mass centre, inertial frame"),
-    "bus_attitude": (("quaternion",), "1", "attitude of the bus in the inertial frame"),
-    "bus_rate": (("axis",), "rad/s", "angular velocity of the bus, bus frame"),
-    "platform_position": (("axis",), "m", "position of the upper plate's origin, inertial frame"),
-    "platform_velocity": (("axis",), "m/s", "velocity of the upper plate's origin, inertial frame"),
-    "platform_attitude": (
-        ("quaternion",),
-        "1",
-        "attitude of the upper plate in the inertial frame",
-    ),
-    "platform_rate": (("axis",), "rad/s", "angular velocity of the upper plate, plate frame"),
-    "gimbal_angle": (("cmg",), "rad", "gimbal angles"),
-    "gimbal_rate": (("cmg",), "rad/s", "gimbal rates"),
-    "leg_stroke": (("leg",), "m", "leg length less its nominal length"),
-    "leg_force": (("leg",), "N", "force of spring and damper, tension positive"),
-    "control_torque": (("axis",), "N m", "commanded torque on the bus, bus frame"),
-    "attitude_error": (
-        ("axis",),
-        "rad",
-        "twice the vector part of the shortest error quaternion, bus frame",
-    ),
-    "singularity_measure": (
-        (),
-        "1",
-        "sqrt(det(A A^T)) of the cluster's torque directions, weighted by momentum",
-    ),
-}
-# of runs in which the control makes units act
-CONTROL_VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
-    "torque_share": ((), "1", "part of the control torque that is delivered along it"),
-}
-# of runs whose rotor speeds change
-ROTOR_VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
-    "rotor_angle": (("cmg",), "rad", "rotor angles"),
-    "rotor_speed": (("cmg",), "rad/s", "rotor speeds, relative to the unit's body"),
-    "rotor_torque": (("cmg",), "N m", "torque of the motor on its rotor"),
-}
+Table = dict[str, tuple[tuple[str, ...], str, str]]  # name: (dimensions, unit, meaning)
+
+_BODIES = ("bus", "plate")
+_PARTS = (
+    *(quantity for name in _BODIES for quantity in body_quantities(name).values()),
+    *cluster.QUANTITIES,
+    *hexapod.QUANTITIES,
+    *control.QUANTITIES,
+)
+
+
+def _table(quantities: Iterable[Quantity]) -> Table:
+    return {q.name: (q.dimensions, q.unit, q.meaning) for q in quantities}
+
+
+def _deviation(quantity: Quantity) -> tuple[tuple[str, ...], str, str]:
+    """Of an attitude: its deviations are rotation vectors."""
+    return ("axis",), "rad", quantity.of_vibration
+
+
+# dimensions after time
+VARIABLES = _table(q for q in _PARTS if not q.when)
+CONTROL_VARIABLES = _table([control.SHARE])  # of runs in which the control makes units act
+CHANGING_VARIABLES = _table([cluster.ROTOR_TORQUE])  # of runs whose rotor speeds change
+JOINT_VARIABLES = _table(q for q in hexapod.QUANTITIES if q.when)
 WORST_PHASES = "worst_phases_rate"  # of runs that a command has written
-JOINT_VARIABLES = {
-    "spherical_force": (
-        ("leg", "axis"),
-        "N",
-        "plate on leg at the spherical joint, inertial frame",
-    ),
-    "universal_force": (("leg", "axis"), "N", "base on leg at the universal joint, inertial frame"),
-    "universal_moment": (("leg",), "N m", "base on leg at the universal joint, about its h axis"),
-    "universal_axis": (("leg", "axis"), "1", "axis of the universal moment, inertial frame"),
+# of harmonic runs; dimensions of a component
+JITTER_VARIABLES: Table = {
+    q.name: ((q.dimensions, q.unit, q.meaning) if not q.of_vibration else _deviation(q))
+    for q in (*_PARTS, *views.QUANTITIES)
+    if q.vibrates
 }
-# of harmonic runs; name: (dimensions of a component, unit, meaning)
-JITTER_VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
-    "bus_rate": VARIABLES["bus_rate"],
-    "bus_attitude": (("axis",), "rad", "rotation of the bus from its slow motion, bus frame"),
-    "platform_rate": VARIABLES["platform_rate"],
-    "leg_stroke": VARIABLES["leg_stroke"],
-    "leg_force": VARIABLES["leg_force"],
-    "point_acceleration": (
-        ("point", "axis"),
-        "m/s^2",
-        "inertial acceleration of a point of the bus, bus frame",
-    ),
-    "line_of_sight": (
-        ("line", "axis"),
-        "rad",
-        "motion of a line of sight, across it, bus frame",
-    ),
-}
+_OF_PLATE = {quantity.name for quantity in body_quantities("plate").values()}
 COMBINED = {
     "envelope": "largest value as lines beat, phases as given",
     "worst_case": "sum of all amplitudes, any phases",
@@ -83,9 +58,27 @@ COMBINED = {
 }
 
 
+def variables_of(bodies: Iterable[str]) -> Table:
+    """Those that every run of a satellite of these bodies has."""
+    own = (quantity for body in bodies for quantity in body_quantities(body).values())
+    return {name: row for name, row in VARIABLES.items() if name not in _OF_PLATE} | _table(own)
+
+
+def jitter_variables_of(bodies: Iterable[str]) -> Table:
+    """Those whose deviations every harmonic run of these bodies has."""
+    known = {name: row for name, row in JITTER_VARIABLES.items() if name not in _OF_PLATE}
+    own = (quantity for body in bodies for quantity in body_quantities(body).values())
+    return _table(q for q in own if q.vibrates) | known
+
+
+def rate_of(body: str) -> str:
+    """Name of a body's angular velocity."""
+    return body_quantities(body)["rate"].name
+
+
 def described(name: str) -> tuple[tuple[str, ...], str] | None:
     """Dimensions and unit of a variable by its name, None of one that no run has."""
-    for table in (VARIABLES, CONTROL_VARIABLES, ROTOR_VARIABLES, JOINT_VARIABLES):
+    for table in (VARIABLES, CONTROL_VARIABLES, CHANGING_VARIABLES, JOINT_VARIABLES):
         if name in table:
             inner, unit, _ = table[name]
             return ("time", *inner), unit
@@ -97,6 +90,9 @@ def described(name: str) -> tuple[tuple[str, ...], str] | None:
         return ("time", "line"), "rad"
     if name == "line_of_sight_cospectrum":
         return ("look", "frequency", "cmg", "line", "pair"), per_hertz("rad")
+    of_body = _of_body(name)
+    if of_body is not None:
+        return ("time", *of_body.dimensions), of_body.unit
     for of, (inner, unit, _) in JITTER_VARIABLES.items():
         parts: dict[str, tuple[tuple[str, ...], str]] = {
             "jitter_amplitude": (("time", "cmg", "order", *inner), unit),
@@ -111,6 +107,34 @@ def described(name: str) -> tuple[tuple[str, ...], str] | None:
         if part != name and part in parts:
             return parts[part]
     return None
+
+
+def told(name: str, more: Mapping[str, Quantity] | None = None) -> tuple[tuple[str, ...], str, str]:
+    """Dimensions after time, unit and meaning of an output by its name.
+
+    Args:
+        more: quantities of parts of users' own kinds.
+    """
+    for table in (VARIABLES, CONTROL_VARIABLES, CHANGING_VARIABLES, JOINT_VARIABLES):
+        if name in table:
+            return table[name]
+    if more and name in more:
+        return _table([more[name]])[name]
+    of_body = _of_body(name)
+    if of_body is None:
+        raise KeyError(name)
+    return _table([of_body])[name]
+
+
+def jitter_of(name: str) -> tuple[tuple[str, ...], str, str]:
+    """Dimensions of a component, unit and meaning of an output's deviations."""
+    return JITTER_VARIABLES[name] if name in JITTER_VARIABLES else told(name)
+
+
+def _of_body(name: str) -> Quantity | None:
+    """What a body of a name that is not known here reports, None of anything else."""
+    body, _, kind = name.rpartition("_")
+    return body_quantities(body).get(kind) if body else None
 
 
 def per_hertz(unit: str) -> str:

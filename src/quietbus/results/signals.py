@@ -5,8 +5,8 @@ import xarray as xr
 from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 
 from quietbus.arguments import positive, vector
-from quietbus.results.origin import rotors, scenario_of
-from quietbus.results.schema import JITTER_VARIABLES, VARIABLES
+from quietbus.results.origin import refuse_no_run
+from quietbus.results.schema import jitter_of, told
 from quietbus.scenario.limits import MOST_SAMPLES
 
 
@@ -34,8 +34,9 @@ def reconstruct(
     Raises:
         ValueError: a run that is not harmonic, an unknown name, or times outside the run.
     """
-    scenario = scenario_of(run)
-    known = [each for each in JITTER_VARIABLES if f"{each}_jitter_phase" in run]
+    refuse_no_run(run)
+    end = "_jitter_phase"
+    known = [str(each).removesuffix(end) for each in run.data_vars if str(each).endswith(end)]
     if name not in known:
         raise ValueError(
             f"the run has no jitter of {name!r}; "
@@ -51,9 +52,7 @@ def reconstruct(
             f"expected a stretch of positive length around a time from {time[0]:g} s to "
             f"{time[-1]:g} s; got {span:g} s around {around:g} s"
         )
-    speed, phase = rotors(scenario)
-    if "rotor_speed" in run:
-        speed = run["rotor_speed"].to_numpy()
+    speed = run["rotor_speed"].to_numpy()
     orders = run["order"].to_numpy()
     fastest = max(orders) * np.max(np.abs(speed)) / (2.0 * np.pi)
     rate = 40.0 * max(fastest, 1.0) if rate is None else rate
@@ -63,9 +62,7 @@ def reconstruct(
     t = first + np.arange(int((last - first) * rate) + 1) / rate
     amplitude, shift = (run[f"{name}_jitter_{part}"] for part in ("amplitude", "phase"))
     at = _interpolated(time, amplitude.to_numpy() * np.exp(1j * shift.to_numpy()), t)
-    if "rotor_speed" not in run:
-        angle = phase + np.outer(t, speed)
-    elif len(time) == 1:
+    if len(time) == 1:
         angle = run["rotor_angle"].to_numpy() + (t - time)[:, None] * speed
     else:
         angle = CubicHermiteSpline(time, run["rotor_angle"].to_numpy(), speed)(t)
@@ -74,9 +71,9 @@ def reconstruct(
     values = np.sum((at * turn.reshape(*turn.shape, *[1] * len(inner))).real, axis=(1, 2))
     if "ripple" in run.dims:
         values = values + _ripple_signal(run, name, t)
-    meaning = f"jitter of {JITTER_VARIABLES[name][2]}"
+    meaning = f"jitter of {jitter_of(name)[2]}"
     if name in run and run[name].dims[1:] == inner:
-        values, meaning = values + _interpolated(time, run[name].to_numpy(), t), VARIABLES[name][2]
+        values, meaning = values + _interpolated(time, run[name].to_numpy(), t), told(name)[2]
     coordinates = {"time": t} | {d: run[d] for d in inner if d in run.coords}
     attributes = {"units": amplitude.attrs["units"], "long_name": meaning}
     return xr.DataArray(values, coordinates, ("time", *inner), name, attributes)

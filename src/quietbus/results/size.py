@@ -6,15 +6,14 @@ import pathlib
 import shutil
 
 from quietbus.results.schema import (
+    CHANGING_VARIABLES,
     COMBINED,
     CONTROL_VARIABLES,
-    JITTER_VARIABLES,
     JOINT_VARIABLES,
-    ROTOR_VARIABLES,
-    VARIABLES,
+    jitter_variables_of,
+    variables_of,
 )
 from quietbus.results.task import Task
-from quietbus.scenario.wheels import WheelCluster
 from quietbus.writing import OutputError
 
 DOUBLE = 8  # [bytes]
@@ -22,24 +21,24 @@ DOUBLE = 8  # [bytes]
 
 def expected_size(task: Task) -> int:
     """Of a run in memory and in its file [bytes], but for its attributes and spectra."""
-    scenario, cluster = task.scenario, task.scenario.cluster
+    scenario, units = task.scenario, task.scenario.units
     sizes = {
         "axis": 3,
         "quaternion": 4,
-        "cmg": cluster.count,
-        "leg": scenario.isolator.legs.count,
-        "order": len(cluster.orders),
+        "cmg": units.count,
+        "leg": scenario.legs,
+        "order": len(units.orders),
         "point": len(task.points),
         "line": len(task.lines_of_sight),
     }
-    tables = [VARIABLES, CONTROL_VARIABLES]
-    if isinstance(cluster, WheelCluster) or cluster.run_up is not None:
-        tables.append(ROTOR_VARIABLES)
+    tables = [variables_of(scenario.bodies), CONTROL_VARIABLES]
+    if units.speeds_change:
+        tables.append(CHANGING_VARIABLES)
     if task.joint_forces:
         tables.append(JOINT_VARIABLES)
     dimensions = [inner for table in tables for inner, _, _ in table.values()]
     if task.method.jitter_apart:
-        for inner, _, _ in JITTER_VARIABLES.values():
+        for inner, _, _ in jitter_variables_of(scenario.bodies).values():
             dimensions += [("cmg", "order", *inner)] * 2 + [inner] * len(COMBINED)
     row = 1 + sum(math.prod(sizes[name] for name in inner) for inner in dimensions)
     rows = scenario.simulation.duration * scenario.simulation.output_rate + 1.0

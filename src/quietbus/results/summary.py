@@ -7,10 +7,9 @@ import numpy as np
 import xarray as xr
 
 from quietbus.analysis.signals.residual import residual, shows
-from quietbus.results.origin import method_of, rotors, scenario_of
+from quietbus.results.origin import method_of, scenario_of
 from quietbus.results.schema import WORST_PHASES
 from quietbus.scenario import Scenario
-from quietbus.scenario.wheels import WheelCluster
 
 
 @dataclass(frozen=True)
@@ -80,7 +79,7 @@ def summarize(run: xr.Dataset) -> Summary:
             note = f"from t = {rest.window[0]:.4g} s to {rest.window[1]:.4g} s"
         except ValueError as too_short:
             note = str(too_short)
-    changing = "rotor_speed" in run
+    changing = "rotor_torque" in run
     speed = run["rotor_speed"].to_numpy() if changing else np.zeros(1)
     return Summary(
         residual_rate=jitter,
@@ -106,25 +105,23 @@ def rotor_notes(run: xr.Dataset) -> list[str]:
     Wheels at their limits, and speeds at which the output no longer shows the rotors' lines.
     """
     said: list[str] = []
-    if "rotor_speed" not in run:
+    if "rotor_torque" not in run:
         return said
     scenario, time = scenario_of(run), run["time"].to_numpy()
     speeds = np.abs(run["rotor_speed"].to_numpy())
     if not method_of(run).jitter_apart and not aliasing(scenario):
         said += filter(None, [aliasing(scenario, float(speeds.max()))])
-    cluster = scenario.cluster
-    if not isinstance(cluster, WheelCluster):
-        return said
-    for j, wheel in enumerate(cluster.placed()):
+    units = scenario.units
+    for j, wheel in units.wheels:
         limit = wheel.motor and wheel.motor.speed_limit
         reached = time[speeds[:, j] >= (1.0 - 1e-6) * (limit or np.inf)]
-        if reached.size and cluster.run_up is None:
+        if reached.size and not units.run_up:
             said.append(
                 f"wheel {j} reached its speed limit of {limit:.5g} rad/s at t = "
                 f"{reached[0]:.4g} s: there it gives no torque that would take it further, and the "
                 "satellite does not feel all that the control asks for"
             )
-    if "torque_share" in run:
+    if "torque_share" in run and not units.gimbals_turn:
         share = run["torque_share"].to_numpy()
         cut = time[share < 1.0 - 1e-6]
         if cut.size:
@@ -142,10 +139,7 @@ def aliasing(scenario: Scenario, speed: float = 0.0) -> str:
     Args:
         speed: [rad/s] that a rotor has reached, if that is more than the scenario says.
     """
-    speeds = [speed, *np.abs(rotors(scenario)[0])]
-    if scenario.cluster.run_up is not None:
-        speeds += np.abs(scenario.cluster.run_up.speeds(tuple(speeds[1:]))).ravel().tolist()
-    fastest = max(speeds) / (2.0 * np.pi)
+    fastest = max(speed, *scenario.units.fastest) / (2.0 * np.pi)
     rate = scenario.simulation.output_rate
     if shows(rate, fastest):
         return ""

@@ -7,7 +7,7 @@ from typing import Any, Self
 import jax.numpy as jnp
 import numpy as np
 
-from quietbus.dynamics.vibration import View
+from quietbus.dynamics.views import View
 from quietbus.methods import METHODS, Method
 from quietbus.results.origin import scenario_from, text_of
 from quietbus.scenario import Scenario
@@ -33,7 +33,12 @@ class Task:
         """Points and lines of sight of a harmonic run."""
         points = np.array(list(self.points.values())).reshape(-1, 3)
         lines = np.array(list(self.lines_of_sight.values())).reshape(-1, 3, 12)
-        return View(jnp.asarray(points), jnp.asarray(lines))
+        own = self.scenario.lines_of_sight
+        on = [
+            self.scenario.seen_from(name if name in own else None) for name in self.lines_of_sight
+        ]
+        bodies = tuple((body, self.scenario.seen_with(body)) for body in on)
+        return View(jnp.asarray(points), jnp.asarray(lines), bodies)
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -66,7 +71,7 @@ def differences(one: Task, other: Task) -> list[str]:
     a, b = one.to_dict(), other.to_dict()
     found = [name for name in a if name != "scenario" and a[name] != b[name]]
     if a["scenario"] != b["scenario"]:
-        fields = _differing(one.scenario.model_dump(), other.scenario.model_dump())
+        fields = _differing(one.scenario.to_dict(), other.scenario.to_dict())
         found += list(fields)[:5] or ["the scenario"]
     return found
 

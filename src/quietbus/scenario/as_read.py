@@ -6,28 +6,35 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from quietbus.scenario.hardware import Cluster, Unit
+from quietbus.scenario.blocks import Block
+from quietbus.scenario.hardware import Cluster, Legs, Unit
 from quietbus.scenario.plausibility import DEG, RPM, plain
 from quietbus.scenario.schema import Scenario
+from quietbus.scenario.sites import BUS
 from quietbus.scenario.wheels import Wheel
 
 
 def as_read(scenario: Scenario) -> list[tuple[str, str]]:
     """Names of parts, each with its main values as text."""
-    bus, isolator, legs = scenario.bus, scenario.isolator, scenario.isolator.legs
-    rows = [
-        ("bus", f"{plain(bus.mass)} kg, inertia {_each(np.diag(bus.inertia))} kg m^2"),
-        (
-            "platform",
-            f"{isolator.mount}, base at {_vector(isolator.offset)} m, plate "
-            f"{plain(isolator.separation)} m above it, {plain(isolator.plate.mass)} kg",
-        ),
-        (
-            "struts",
-            f"{legs.count} of {_spread(np.ravel(legs.stiffness) / 1e3)} kN/m and "
-            f"{_spread(np.ravel(legs.damping))} N s/m",
-        ),
-        *_units(scenario),
+    bus, many = scenario.bus, len(scenario.sites) > 1
+    rows = [("bus", f"{plain(bus.mass)} kg, inertia {_each(np.diag(bus.inertia))} kg m^2")]
+    for site in scenario.sites:
+        isolator = site.isolator
+        base = "" if site.on == BUS else f" on {site.on}"
+        rows += [
+            (
+                site.name if many else "platform",
+                f"{isolator.mount}, base at {_vector(isolator.offset)} m{base}, plate "
+                f"{plain(isolator.separation)} m above it, {plain(site.plate.mass)} kg",
+            ),
+            ("struts", f"{isolator.legs.count} of {_struts(isolator.legs)}"),
+        ]
+        first = 0
+        for block in site.blocks:
+            rows += _units(block, first)
+            first += block.count
+    rows += [
+        *_actuators(scenario),
         *_control(scenario),
     ]
     start = scenario.initial
@@ -47,8 +54,7 @@ def as_read(scenario: Scenario) -> list[tuple[str, str]]:
     return rows
 
 
-def _units(scenario: Scenario) -> list[tuple[str, str]]:
-    cluster = scenario.cluster
+def _units(cluster: Block, first: int) -> list[tuple[str, str]]:
     units: tuple[Unit | Wheel, ...] = cluster.placed()
     rotors = [unit.rotor for unit in units if unit.rotor]
     kind = "CMGs" if isinstance(cluster, Cluster) else "wheels"
@@ -73,7 +79,7 @@ def _units(scenario: Scenario) -> list[tuple[str, str]]:
     lines = max((len(table.orders or ()) for table in tables), default=0)
     imbalance += f", tables of {lines} lines" if lines else ""
     imbalance += ", noise" if any(table.broadband.given() for table in tables) else ""
-    phases = _each(np.multiply(cluster.phases(), DEG))
+    phases = _each(np.multiply(cluster.phases(first), DEG))
     drawn = "random, " if cluster.rotor_phases == "random" else ""
     rows += [("imbalance", imbalance), ("rotor phases", f"{drawn}{phases} deg")]
     if isinstance(cluster, Cluster):
@@ -136,3 +142,16 @@ def _spread(values: Iterable[float]) -> str:
     found = [float(value) for value in values]
     least, most = plain(min(found)), plain(max(found))
     return least if least == most else f"{least} to {most}"
+
+
+def _struts(legs: Legs) -> str:
+    both = legs.law.spring_and_damper()
+    if both is None:
+        return f"type {legs.law.type}"
+    stiffness, damping = map(np.ravel, both)
+    return f"{_spread(stiffness / 1e3)} kN/m and {_spread(damping)} N s/m"
+
+
+def _actuators(scenario: Scenario) -> list[tuple[str, str]]:
+    each = [f"{name} ({actuator.type})" for name, actuator in scenario.actuators.items()]
+    return [("actuators", ", ".join(each))] if each else []

@@ -16,6 +16,7 @@ from quietbus.scenario.base import (
     Force,
     IntegralGain,
     Length,
+    Name,
     NonNegativeNumber,
     Number,
     Part,
@@ -269,7 +270,7 @@ def _profile_form(value: Any) -> str:
 class Load(Part):
     """An external force and torque on one body."""
 
-    body: Literal["bus", "plate"]
+    body: Name  # bus, plate, or the name of another body
     frame: Literal["body", "inertial"] = "body"  # of force and torque
     force: Vector[Force] = ZERO
     torque: Vector[Torque] = ZERO

@@ -8,8 +8,11 @@ import numpy as np
 from pydantic import (
     BeforeValidator,
     Discriminator,
+    Field,
     SerializerFunctionWrapHandler,
     Tag,
+    ValidationInfo,
+    field_validator,
     model_serializer,
     model_validator,
 )
@@ -46,9 +49,10 @@ from quietbus.scenario.base import (
 )
 from quietbus.scenario.checks import free_directions, inertia_defect, listed
 from quietbus.scenario.disturbance import Disturbance, GimbalMotor
-from quietbus.scenario.errors import Findings
+from quietbus.scenario.errors import Findings, Path
 from quietbus.scenario.limits import MOST_LEGS, MOST_UNITS
 from quietbus.scenario.run_up import RunUp
+from quietbus.scenario.struts import AnyStrut, SpringDamperStrut
 from quietbus.scenario.units import expected
 
 
@@ -94,8 +98,9 @@ class Legs(Part):
     upper_joints: Vectors[Length]  # upper-plate frame
     lower_joints: Vectors[Length]  # base-plate frame
     universal_axes: UnitVectors  # base-plate frame
-    stiffness: PerLeg[Stiffness]
-    damping: PerLeg[Damping]
+    strut: AnyStrut | None = None  # a law of any type, or instead of it the two
+    stiffness: PerLeg[Stiffness] | None = Field(None, validate_default=True)
+    damping: PerLeg[Damping] | None = Field(None, validate_default=True)
     free_length: PerLeg[PositiveLength] | None = None  # None: as the nominal pose has it
     upper_part: PerLeg[LegPart]
     lower_part: PerLeg[LegPart]
@@ -107,6 +112,28 @@ class Legs(Part):
         """Number of legs."""
         return len(self.upper_joints)
 
+    @property
+    def law(self) -> Any:
+        """The law of the struts, whichever form the file used."""
+        if self.strut is not None:
+            return self.strut
+        return SpringDamperStrut(stiffness=self.stiffness, damping=self.damping)
+
+    @field_validator("stiffness", "damping")
+    @classmethod
+    def _one_form(cls, value: Any, info: ValidationInfo) -> Any:
+        """Beside all other fields, so that a missing one is told with what else is wrong."""
+        if "strut" not in info.data:  # it is wrong, and told
+            return value
+        findings, strut = Findings(), info.data["strut"]
+        if value is not None and strut is not None:
+            findings.add((), "expected it in strut, since a strut is given there; got both")
+        if value is None and strut is None:
+            what = "a stiffness in N/m" if info.field_name == "stiffness" else "a damping in N*s/m"
+            findings.add((), f"expected {what}, or a strut; got nothing")
+        findings.raise_any()
+        return value
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         findings = Findings()
@@ -114,11 +141,13 @@ class Legs(Part):
             findings.add("upper_joints", f"expected at least 3 legs, got {self.count}")
         if self.count > MOST_LEGS:
             findings.add("upper_joints", f"expected at most {MOST_LEGS} legs, got {self.count}")
-        for key in type(self).model_fields:
-            value = getattr(self, key)
+        lists: dict[Path, Any] = {(key,): getattr(self, key) for key in type(self).model_fields}
+        if self.strut is not None:
+            lists |= {("strut", key): getattr(self.strut, key) for key in self.strut.per_leg()}
+        for path, value in lists.items():
             if isinstance(value, tuple) and len(value) != self.count:
                 findings.add(
-                    key,
+                    path,
                     f"expected {self.count} entries, one for each of upper_joints, "
                     f"got {len(value)}",
                 )
@@ -126,14 +155,13 @@ class Legs(Part):
         return self
 
 
-class Isolator(Part):
-    """The platform: base plate fixed to the bus, legs, upper plate."""
+class Mounting(Part):
+    """Legs on a base plate that is fixed to a body, and whether they are in use."""
 
     mount: Literal["isolated", "rigid"] = "isolated"
     offset: Vector[Length]  # base-plate centre in the bus frame
     orientation: Vector[Angle] = ZERO  # [roll, pitch, yaw] of the base plate in the bus
     separation: Length  # of the upper-plate frame above the base-plate frame, nominal pose
-    plate: Plate
     legs: Legs
 
     def joints(self) -> tuple[np.ndarray, np.ndarray]:
@@ -179,6 +207,12 @@ class Isolator(Part):
             )
         findings.raise_any()
         return self
+
+
+class Isolator(Mounting):
+    """The platform: base plate fixed to the bus, legs, upper plate."""
+
+    plate: Plate
 
 
 class GimbalBody(Part):

@@ -10,7 +10,7 @@ import numpy as np
 MOST_LETTERS = 4_000_000  # of a scenario's text
 MOST_ENTRIES = 100_000  # values, lists and mappings, aliases unfolded
 MOST_DEPTH = 40  # lists and mappings in each other
-MOST_UNITS = 1_000  # CMGs or wheels of a cluster
+MOST_UNITS = 1_000  # CMGs or wheels
 MOST_LEGS = 200
 MOST_HARMONICS = 1_000  # of a motor's stepping frequency
 MOST_LINES_A_TURN = 1_000_000  # of ripple or steps

@@ -10,7 +10,6 @@ from quietbus.arguments import positive
 from quietbus.scenario.disturbance import Disturbance
 from quietbus.scenario.errors import Problem, ScenarioError
 from quietbus.scenario.schema import Scenario
-from quietbus.scenario.wheels import WheelCluster
 from quietbus.words import shown
 
 
@@ -41,12 +40,15 @@ def per_cmg_scenarios(scenario: Scenario, scale: float | None = None) -> list[Sc
     """
     if not isinstance(scenario, Scenario):
         raise TypeError(f"scenario: expected a Scenario, got {shown(scenario)}")
-    if isinstance(scenario.cluster, WheelCluster):
+    if not np.all(scenario.units.turning):
         said = "expected cmg for platforms that stand one under each CMG, got wheel"
         raise ScenarioError(scenario.name, [Problem(said, ("cluster", "type"))])
+    if len(scenario.sites) > 1 or len(scenario.units.blocks) > 1:
+        said = "expected one platform with one block of CMGs, got several"
+        raise ScenarioError(scenario.name, [Problem(said, ("platforms",))])
     from scipy.spatial.transform import Rotation  # takes as long to load as all else here
 
-    data, n = scenario.to_dict(), scenario.cluster.count
+    data, n = scenario.to_dict(), scenario.units.count
     scale = n**-0.5 if scale is None else scale
     positive("scale", scale)
     share = 1.0 / n
@@ -55,10 +57,10 @@ def per_cmg_scenarios(scenario: Scenario, scale: float | None = None) -> list[Sc
     separation = scale * isolator["separation"]
     legs = _times(isolator["legs"], _BY_LEG, share, scale)
     plate = _times(isolator["plate"], _BY_PLATE, share, scale)
-    phases = scenario.cluster.phases()
+    phases = scenario.units.phases()
     angles = data["cluster"].get("gimbal_angles", [0.0] * n)
     found = []
-    for j, unit in enumerate(scenario.cluster.placed()):
+    for j, unit in enumerate(scenario.units.placed()):
         height = [0.0, 0.0, isolator["separation"] - separation]
         offset = isolator["offset"] + base.apply(np.add(unit.position, height))
         cluster = {k: v for k, v in data["cluster"].items() if k not in ("pyramid", "units")}
@@ -74,8 +76,9 @@ def per_cmg_scenarios(scenario: Scenario, scale: float | None = None) -> list[Sc
             "rotor_phases": [phases[j]],
             "gimbal_angles": [angles[j]],
         }
-        if scenario.cluster.gimbal_motor is not None:
-            motor, seed = scenario.cluster.gimbal_motor, scenario.cluster.seeds[j]
+        motor = scenario.units.blocks[0].gimbal_motor
+        if motor is not None:
+            seed = scenario.units.seeds[j]
             cluster["gimbal_motor"] = _drawn_motor(cluster["gimbal_motor"], *motor.phases(seed, j))
         if "run_up" in cluster:
             each = {k: v[j] for k, v in cluster["run_up"].items() if isinstance(v, list)}

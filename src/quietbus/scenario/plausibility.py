@@ -18,11 +18,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from quietbus.scenario.base import Part
+from quietbus.scenario.blocks import Block
 from quietbus.scenario.errors import Path, dotted
-from quietbus.scenario.hardware import Cluster, Rotor, Unit
+from quietbus.scenario.hardware import Cluster, Rotor
 from quietbus.scenario.schema import Scenario
 from quietbus.scenario.units import Quantity
-from quietbus.scenario.wheels import Wheel
 
 DEG, RPM = 180.0 / np.pi, 30.0 / np.pi
 MOST_TURN = 30.0 / DEG  # [rad] of a step of attitude
@@ -202,8 +202,9 @@ def _derived(scenario: Scenario) -> Iterator[tuple[str, str]]:
 
 def _bodies(scenario: Scenario) -> Iterator[tuple[str, str]]:
     """Inertias that do not go with their masses."""
-    bus, plate = scenario.bus, scenario.isolator.plate
-    bodies = [("bus", bus.mass, bus.inertia), ("isolator.plate", plate.mass, plate.inertia)]
+    bus = scenario.bus
+    bodies = [("bus", bus.mass, bus.inertia)]
+    bodies += [(site.plate_at, site.plate.mass, site.plate.inertia) for site in scenario.sites]
     for where, mass, inertia in bodies:
         radius = _radius(mass, inertia)
         if not 0.01 < radius < 30.0:
@@ -212,35 +213,41 @@ def _bodies(scenario: Scenario) -> Iterator[tuple[str, str]]:
                 f"{np.diag(inertia).max():.4g} kg m^2 with a mass of {mass:.4g} kg: a radius of "
                 f"gyration of {radius:.3g} m, where bodies of satellites have 0.01 m to 30 m",
             )
-    cluster = scenario.cluster
-    body = cluster.gimbal_body if isinstance(cluster, Cluster) else cluster.housing
-    radius = _radius(body.mass, np.diag(body.inertia))
-    if not 0.005 < radius < 2.0:
-        name = "gimbal_body" if isinstance(cluster, Cluster) else "housing"
-        yield (
-            f"cluster.{name}.inertia",
-            f"{max(body.inertia):.4g} kg m^2 with a mass of {body.mass:.4g} kg: a radius of "
-            f"gyration of {radius:.3g} m, where units have 5 mm to 2 m",
-        )
+    for where, block in _blocks(scenario):
+        name = "gimbal_body" if isinstance(block, Cluster) else "housing"
+        body = getattr(block, name)
+        radius = _radius(body.mass, np.diag(body.inertia))
+        if not 0.005 < radius < 2.0:
+            yield (
+                f"{where}.{name}.inertia",
+                f"{max(body.inertia):.4g} kg m^2 with a mass of {body.mass:.4g} kg: a radius of "
+                f"gyration of {radius:.3g} m, where units have 5 mm to 2 m",
+            )
+
+
+def _blocks(scenario: Scenario) -> list[tuple[str, Block]]:
+    """All blocks of units with their paths."""
+    return [each for site in scenario.sites for each in site.blocks_at]
 
 
 def _rotors(scenario: Scenario) -> Iterator[tuple[str, str]]:
     told: set[Rotor] = set()
     quiet = True
-    units: tuple[Unit | Wheel, ...] = scenario.cluster.placed()
-    for j, unit in enumerate(units):
-        rotor = unit.rotor
-        if rotor is None:
-            continue
-        quiet = quiet and not _shakes(rotor)
-        if rotor in told:
-            continue
-        where = "cluster.rotor" if rotor == scenario.cluster.rotor else f"cluster.units[{j}].rotor"
-        told.add(rotor)
-        yield from ((f"{where}.{key}", note) for key, note in _rotor(rotor))
+    for at, block in _blocks(scenario):
+        placed: tuple[Any, ...] = block.placed()
+        for j, unit in enumerate(placed):
+            rotor = unit.rotor
+            if rotor is None:
+                continue
+            quiet = quiet and not _shakes(rotor)
+            if rotor in told:
+                continue
+            where = f"{at}.rotor" if rotor == block.rotor else f"{at}.units[{j}].rotor"
+            told.add(rotor)
+            yield from ((f"{where}.{key}", note) for key, note in _rotor(rotor))
     if quiet:
         yield (
-            "cluster.rotor",
+            f"{_blocks(scenario)[0][0]}.rotor",
             "balanced exactly, without orders or noise: nothing shakes, so that all jitter is zero",
         )
 
@@ -308,32 +315,36 @@ def _rotor(rotor: Rotor) -> Iterator[tuple[str, str]]:
 
 def _suspension(scenario: Scenario) -> Iterator[tuple[str, str]]:
     """Struts that are too soft, too hard or too damped for what they carry."""
-    legs = scenario.isolator.legs
-    lower, upper = scenario.isolator.joints()
-    along = (upper - lower) / np.linalg.norm(upper - lower, axis=1, keepdims=True)
-    units: tuple[Unit | Wheel, ...] = scenario.cluster.placed()
-    carried = scenario.isolator.plate.mass + sum(
-        (unit.gimbal_body.mass if unit.gimbal_body else 0.0)
-        + (unit.rotor.mass if unit.rotor else 0.0)
-        for unit in units
-    )
-    stiffness = np.broadcast_to(legs.stiffness, legs.count)
-    damping = np.broadcast_to(legs.damping, legs.count)
-    k, c = (np.trace((along.T * each) @ along) / 3.0 for each in (stiffness, damping))
-    hertz = np.sqrt(k / carried) / (2.0 * np.pi)
-    if not 0.2 < hertz < 500.0:
-        yield (
-            "isolator.legs.stiffness",
-            f"{stiffness.max():.4g} N/m: {carried:.4g} kg on these struts swing at some "
-            f"{hertz:.3g} Hz, where isolators have 0.2 Hz to 500 Hz; a bare number is in N/m",
+    for site in scenario.sites:
+        legs = site.isolator.legs
+        lower, upper = site.isolator.joints()
+        along = (upper - lower) / np.linalg.norm(upper - lower, axis=1, keepdims=True)
+        both = legs.law.spring_and_damper()
+        if both is None:
+            continue
+        where = site.legs_at if legs.strut is None else f"{site.legs_at}.strut"
+        units = (unit for block in site.blocks for unit in block.placed())
+        carried = site.plate.mass + sum(
+            (unit.gimbal_body.mass if unit.gimbal_body else 0.0)
+            + (unit.rotor.mass if unit.rotor else 0.0)
+            for unit in units
         )
-    ratio = c / (2.0 * np.sqrt(k * carried))
-    if ratio > 5.0:
-        yield (
-            "isolator.legs.damping",
-            f"{damping.max():.4g} N s/m: {ratio:.3g} times critical damping, which lets all "
-            "vibration pass; a bare number is in N s/m",
-        )
+        stiffness, damping = (np.broadcast_to(each, legs.count) for each in both)
+        k, c = (np.trace((along.T * each) @ along) / 3.0 for each in (stiffness, damping))
+        hertz = np.sqrt(k / carried) / (2.0 * np.pi)
+        if not 0.2 < hertz < 500.0:
+            yield (
+                f"{where}.stiffness",
+                f"{stiffness.max():.4g} N/m: {carried:.4g} kg on these struts swing at some "
+                f"{hertz:.3g} Hz, where isolators have 0.2 Hz to 500 Hz; a bare number is in N/m",
+            )
+        ratio = c / (2.0 * np.sqrt(k * carried))
+        if ratio > 5.0:
+            yield (
+                f"{where}.damping",
+                f"{damping.max():.4g} N s/m: {ratio:.3g} times critical damping, which lets all "
+                "vibration pass; a bare number is in N s/m",
+            )
 
 
 def _attitudes(scenario: Scenario) -> Iterator[tuple[str, str]]:

@@ -14,6 +14,7 @@ from quietbus.scenario.base import (
     Duration,
     Frequency,
     FrozenDict,
+    Name,
     Number,
     Part,
     StartTime,
@@ -41,7 +42,8 @@ class LineOfSight(Part):
     the upper plate from its place in the bus; all along bus axes.
     """
 
-    direction: UnitVector | None = None  # fixed in the bus, bus frame
+    on: Name | None = None  # the body that it is on; None: the payload, or else the bus
+    direction: UnitVector | None = None  # fixed in that body, its frame
     sensitivity: Annotated[tuple[Row, ...], listing(None, f"rows of {COLUMNS} numbers")] | None = (
         None
     )
@@ -49,7 +51,7 @@ class LineOfSight(Part):
     @model_validator(mode="after")
     def _check(self) -> Self:
         findings = Findings()
-        given = [key for key in type(self).model_fields if getattr(self, key) is not None]
+        given = [key for key in ("direction", "sensitivity") if getattr(self, key) is not None]
         if len(given) != 1:
             got = " and ".join(given) or "neither"
             findings.add((), f"expected one of direction and sensitivity, got {got}")

@@ -145,7 +145,8 @@ def _known_type(value: Any) -> Any:
         if kind not in TYPES and kind is not None:
             findings.add(path, expected(f"one of {', '.join(TYPES)}", kind).message())
         elif known and kind not in (None, known[0]):
-            what = f"{known[0]} as before, since one cluster cannot mix CMGs and reaction wheels"
+            what = f"{known[0]} as before, since one block cannot mix CMGs and reaction wheels (a "
+            what += "list of blocks can)"
             findings.add(path, expected(what, kind).message())
         elif kind is not None:
             known.append(kind)
@@ -162,6 +163,18 @@ def cluster_type(value: Any) -> str:
     if said == [None] and isinstance(units, list | tuple):
         said = [unit.get("type") for unit in units if isinstance(unit, dict)]
     return "<wheel>" if "wheel" in said else "<cmg>"
+
+
+def unit_count(value: Any) -> int:
+    """How many units a block's data asks for."""
+    if isinstance(value, Placed):
+        return value.count
+    if not isinstance(value, dict):
+        return 0
+    units, pyramid = value.get("units"), value.get("pyramid")
+    placed = len(units) if isinstance(units, list | tuple) else 0
+    around = pyramid.get("units") if isinstance(pyramid, dict) else 0
+    return placed + (around if isinstance(around, int) else 0)
 
 
 AnyCluster = Annotated[

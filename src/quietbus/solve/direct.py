@@ -17,15 +17,12 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float
 
-from quietbus.dynamics.closed_loop import state_rate, with_plate_on_bus
+from quietbus.dynamics.closed_loop import state_rate, tidy
 from quietbus.dynamics.outputs import Outputs, geometry_margin, outputs
 from quietbus.dynamics.state import State
-from quietbus.model.cmg import ClusterMoments
 from quietbus.model.satellite import Satellite
-from quietbus.model.variants import without_disturbance
 from quietbus.solve.integrator import diffeqsolve
 from quietbus.solve.resolved_steps import ResolvingController, fastest_line
-from quietbus.spatial.rotation import quaternion_normalize
 
 STEPS_PER_CALL = 4096  # at the most, so that a stiff run too can be watched and stopped
 SAME_INSTANT = 1e-9  # [s] instants closer than this are one
@@ -186,14 +183,12 @@ def _piece(satellite, state, t0, t1, step, ts, tolerances, scheme) -> _Piece:
 @eqx.filter_jit
 def _compiled_piece(satellite, state, numbers, scheme) -> _Piece:
     t0, t1, step, ts, rtol, atol = numbers
-    moments = ClusterMoments.expand(satellite.cluster)
-    if scheme.averaged:
-        moments, satellite = moments.averaged(), without_disturbance(satellite)
+    satellite = satellite.averaged() if scheme.averaged else satellite.prepared()
     y0, unravel = ravel_pytree(state)
 
     @jax.jit  # traced once for the integrator's many uses of it
     def rate(t, y, args):  # noqa: ARG001
-        return ravel_pytree(state_rate(satellite, t, unravel(y), None, moments))[0]
+        return ravel_pytree(state_rate(satellite, t, unravel(y)))[0]
 
     def left_geometry(t, y, args, **kwargs):  # noqa: ARG001
         return geometry_margin(satellite, unravel(y)) <= 0.0
@@ -205,12 +200,10 @@ def _compiled_piece(satellite, state, numbers, scheme) -> _Piece:
         rtol=rtol, atol=atol, pcoeff=pcoeff, icoeff=icoeff, dtmin=1e-9, force_dtmin=False
     )
     if not scheme.averaged:
-        line = fastest_line(satellite, moments, unravel)
+        line = fastest_line(satellite, unravel)
         controller = ResolvingController(controller, line)
     finish = t1
-    corners = [load.profile.corners for load in satellite.loads]
-    if satellite.cluster.run_up is not None:
-        corners.append(satellite.cluster.run_up.corners)
+    corners = [element.corners() for element in satellite.elements]
     if sum(len(corner) for corner in corners):
         jumps = _apart(jnp.sort(jnp.concatenate(corners)), t0, t1)
         # the last stage of the last step must not see what lies beyond a corner at the end
@@ -239,13 +232,9 @@ def _compiled_piece(satellite, state, numbers, scheme) -> _Piece:
     ended = (solution.result == diffrax.RESULTS.successful) | (
         solution.result == diffrax.RESULTS.max_steps_reached
     )
-    states = jax.vmap(lambda y: _tidy(satellite, unravel(y)))(saved)
-    reported = jax.vmap(
-        lambda t, s: outputs(
-            satellite, t, s, scheme.joint_forces, moments if scheme.averaged else None
-        )
-    )(ts, states)
-    final = _tidy(satellite, unravel(last))
+    states = jax.vmap(lambda y: tidy(unravel(y)))(saved)
+    reported = jax.vmap(lambda t, s: outputs(satellite, t, s, scheme.joint_forces))(ts, states)
+    final = tidy(unravel(last))
     return _Piece(
         kept=(reported, states if scheme.states else None),
         valid=valid,
@@ -267,27 +256,23 @@ def _apart(jumps, t0, t1):
     return jumps
 
 
-def _tidy(satellite: Satellite, state: State) -> State:
-    """The state with unit quaternions, and on a rigid mount with the plate where the bus holds it.
-
-    Both hold exactly in the equations; this removes the integrator's drift.
-    """
-    attitudes = lambda s: (s.q_NB, s.q_NP)  # noqa: E731
-    unit = tuple(quaternion_normalize(q) for q in attitudes(state))
-    state = eqx.tree_at(attitudes, state, unit)
-    return with_plate_on_bus(satellite, state) if satellite.mount == "rigid" else state
-
-
 def _reason(piece: _Piece) -> str | None:
     """Why a piece ended before its time, in words for the user."""
     t = float(piece.time_reached)
     if bool(piece.sound):
         return None
-    where = (
-        f"at t = {t:.6g} s, bus rate {_show(piece.final.w_NB_B)} rad/s, "
-        f"platform {_show(piece.final.p_NP_N - piece.final.p_NB_N)} m from the bus, "
-        f"gimbal rates {_show(piece.final.gimbal_rate)} rad/s"
+    bus = piece.final.bus
+    others = "".join(
+        f", {name} {_show(body.p_NX_N - bus.p_NX_N)} m from the bus"
+        for name, body in piece.final.bodies.items()
+        if body is not bus
     )
+    driven = "".join(
+        f", {name} driven at {_show(own.y_rate)} rad/s"
+        for name, own in piece.final.own.items()
+        if len(own.y)
+    )
+    where = f"at t = {t:.6g} s, bus rate {_show(bus.w_NX_X)} rad/s{others}{driven}"
     if float(piece.margin) <= 0.0:
         return (
             f"a leg reached the end of its geometry (length near zero, or a universal joint in "

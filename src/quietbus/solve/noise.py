@@ -10,12 +10,14 @@ import scipy.fft
 from scipy.integrate import trapezoid
 
 from quietbus.dynamics.disturbance_response import CROSS, noise_psd
-from quietbus.dynamics.vibration import Vibration, View
-from quietbus.model.disturbance import Disturbance, Noise
+from quietbus.dynamics.vibration import Vibration
+from quietbus.dynamics.views import View
+from quietbus.model.cluster import Cluster
+from quietbus.model.disturbance import AbstractDisturbance, Noise
 from quietbus.model.satellite import Satellite
 
 KNOTS = 8.0  # of a realisation in a period of the highest frequency
-PEAK = 24  # frequencies about a mode at which spectra are computed
+PEAK = 48  # frequencies about a mode at which spectra are computed
 BROAD = 240  # frequencies over the band, besides
 CHUNK = 256  # frequencies that programs share
 
@@ -51,18 +53,29 @@ def with_noise(satellite: Satellite, seeds: Sequence[int], duration: float) -> S
         seeds: of the rotors; the same one gives the same noise.
         duration: [s] that it is to last without repeating.
     """
-    disturbance, cluster = satellite.disturbance, satellite.cluster
-    if disturbance is None or not disturbance.noisy:
-        return satellite
-    lowest, highest = _band(disturbance)
+    realised, first = [], 0
+    for cluster in satellite.clusters:
+        numbered = list(enumerate(seeds[first : first + cluster.count], first))
+        realised.append(_realised(cluster, numbered, duration))
+        first += cluster.count
+    return replace(satellite, clusters=tuple(realised))
+
+
+def _realised(cluster: Cluster, seeds: Sequence[tuple[int, int]], duration: float) -> Cluster:
+    """A cluster with a realisation of its noise, by numbers and seeds of its rotors."""
+    disturbance = cluster.disturbance
+    if not disturbance.noisy:
+        return cluster
+    lowest, highest = _band([disturbance])
     period = max(duration, 10.0 / lowest)
     n = scipy.fft.next_fast_len(int(np.ceil(KNOTS * highest * period)), real=True)
     rate = n / period
     frequency = np.arange(1, int(highest * period + 1e-9) + 1) / period
     size = np.sqrt(2.0 * np.asarray(disturbance.density(jnp.asarray(frequency))) / period)
-    draw = [np.random.default_rng([seed, j, 1]) for j, seed in enumerate(seeds)]
+    draw = [np.random.default_rng([seed, j, 1]) for j, seed in seeds]
     turn = np.stack([d.uniform(-np.pi, np.pi, (len(frequency), 6)) for d in draw], axis=1)
-    inputs = jax.jit(jax.vmap(lambda w: disturbance.unit_inputs(cluster, w)))(
+    units = cluster.units
+    inputs = jax.jit(jax.vmap(lambda w: disturbance.unit_inputs(units, units.rotor_speed, w)))(
         jnp.asarray(2.0 * np.pi * frequency)
     )
     lines = np.einsum("fjc,fjca->fja", size * np.exp(1j * turn), np.asarray(inputs))
@@ -71,7 +84,7 @@ def with_noise(satellite: Satellite, seeds: Sequence[int], duration: float) -> S
     spectrum = np.zeros((n // 2 + 1, *lines.shape[1:]), complex)
     spectrum[1 : len(frequency) + 1] = 0.5 * n * lines / sampled[:, None, None]
     noise = Noise(jnp.asarray(rate), jnp.asarray(scipy.fft.irfft(spectrum, n, axis=0)))
-    return replace(satellite, disturbance=replace(disturbance, noise=noise))
+    return replace(cluster, disturbance=disturbance.with_noise(noise))
 
 
 def noise_spectra(
@@ -83,7 +96,6 @@ def noise_spectra(
         small: equations of small vibration, with a leading axis of instants.
         modes: eigenvalues of the satellite [rad/s], about which frequencies are dense.
     """
-    assert satellite.disturbance is not None
     frequency = frequency_grid(satellite, modes)
     parts = []
     for start in range(0, len(frequency), CHUNK):
@@ -95,14 +107,20 @@ def noise_spectra(
     return frequency, psd, psd.pop(CROSS)
 
 
-def _tables(disturbance: Disturbance) -> list[np.ndarray]:
-    spectra = [s for each in disturbance.broadband for s in each if s is not None]
-    return [np.asarray(spectrum.frequency) for spectrum in spectra]
+def noisy(satellite: Satellite) -> list[AbstractDisturbance]:
+    """Disturbances of the clusters that have noise."""
+    each = (cluster.disturbance for cluster in satellite.clusters)
+    return [disturbance for disturbance in each if disturbance.noisy]
 
 
-def _band(disturbance: Disturbance) -> tuple[float, float]:
+def _tables(disturbances: Sequence[AbstractDisturbance]) -> list[np.ndarray]:
+    each = [s for d in disturbances for b in d.spectra() for s in b if s is not None]
+    return [np.asarray(spectrum.frequency) for spectrum in each]
+
+
+def _band(disturbances: Sequence[AbstractDisturbance]) -> tuple[float, float]:
     """Lowest and highest frequency [Hz] of all tables."""
-    tables = _tables(disturbance)
+    tables = _tables(disturbances)
     return float(min(t[0] for t in tables)), float(max(t[-1] for t in tables))
 
 
@@ -113,14 +131,13 @@ def frequency_grid(satellite: Satellite, modes: np.ndarray) -> np.ndarray:
         satellite: with noise.
         modes: eigenvalues [rad/s] about which frequencies are dense.
     """
-    disturbance = satellite.disturbance
-    assert disturbance is not None
-    low, high = _band(disturbance)
-    tables = _tables(disturbance)
+    low, high = _band(noisy(satellite))
+    tables = _tables(noisy(satellite))
     ends = np.array([end for table in tables for end in (table[0], table[-1])])
     found = [*tables, np.geomspace(low, high, BROAD), ends * (1 - 1e-9), ends * (1 + 1e-9)]
     peaks = np.concatenate([modes.ravel(), _whirl(satellite)])
-    about = np.tan(np.linspace(-0.47 * np.pi, 0.47 * np.pi, PEAK + 1))  # in half widths
+    # in half widths, so far out that the band's own spacing holds the flanks of light damping too
+    about = np.sinh(np.linspace(-7.0, 7.0, PEAK + 1))
     for mode in peaks[np.abs(peaks.imag) > 0.0]:
         found.append((abs(mode.imag) + abs(mode.real) * about) / (2.0 * np.pi))
     all_ = np.unique(np.concatenate(found))
@@ -129,16 +146,16 @@ def frequency_grid(satellite: Satellite, modes: np.ndarray) -> np.ndarray:
 
 def _whirl(satellite: Satellite) -> np.ndarray:
     """Eigenvalues [rad/s] of the rotors on their bearings."""
-    disturbance, cluster = satellite.disturbance, satellite.cluster
-    assert disturbance is not None
-    inertia = np.asarray(cluster.I_RRcm_R)
-    split = inertia[:, 0, 0] * np.asarray(cluster.rotor_speed) / inertia[:, 1, 1]
-    found: list[np.ndarray] = []
-    for periods, dampings, turning in zip(
-        np.asarray(disturbance.period), np.asarray(disturbance.damping), split, strict=True
-    ):
-        for k, (tau, zeta) in enumerate(zip(periods, dampings, strict=True)):
-            if tau > 0.0:
-                gyroscopic = 1j * turning * (k == 2)
-                found.append(np.roots([1.0, 2.0 * zeta / tau - gyroscopic, tau**-2]))
-    return np.concatenate(found) if found else np.zeros(0, complex)
+    found = [np.zeros(0, complex)]
+    for cluster in satellite.clusters:
+        disturbance, units = cluster.disturbance, cluster.units
+        inertia = np.asarray(units.I_RRcm_R)
+        split = inertia[:, 0, 0] * np.asarray(units.rotor_speed) / inertia[:, 1, 1]
+        for periods, dampings, turning in zip(
+            *map(np.asarray, disturbance.bearings()), split, strict=True
+        ):
+            for k, (tau, zeta) in enumerate(zip(periods, dampings, strict=True)):
+                if tau > 0.0:
+                    gyroscopic = 1j * turning * (k == 2)
+                    found.append(np.roots([1.0, 2.0 * zeta / tau - gyroscopic, tau**-2]))
+    return np.concatenate(found)

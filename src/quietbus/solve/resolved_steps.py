@@ -13,67 +13,55 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from quietbus.dynamics.state import State
-from quietbus.model.cmg import ClusterMoments
+from quietbus.model.cluster import Cluster
+from quietbus.model.element import NOTHING
 from quietbus.model.satellite import Satellite
 
 STEPS = 3.5  # in a period at the least: 1e-5 of a line's amplitude by the eighth-order method
-NOTHING = 1e-12  # of the mean inertia or the mass: imbalance that is none
+NOTHING_OF = 1e-12  # of the mean inertia or the mass: imbalance that is none
 FAINT = 1e-3  # of order 1, by force at a lever of a metre: imbalance's order 2 that is none
 
 
 class FastestLine(eqx.Module):
     """What the highest frequency at a state follows from."""
 
-    order: Float[Array, " cmg"]  # [-] highest of each rotor; 0: none
-    rotor_speed: Float[Array, " cmg"] | None  # [rad/s]; None: the state has them
-    steady: Float[Array, ""]  # [rad/s] of what does not depend on the state
-    ripple: Float[Array, ""]  # [-] highest multiple of the gimbals' angles; 0: none
+    clusters: tuple[Cluster, ...]
+    orders: tuple[Float[Array, " cmg"], ...]  # [-] highest of each rotor; 0: none
+    noise: Float[Array, ""]  # [rad/s] the highest frequency of noise; 0: none
     unravel: Callable[[Array], State] = eqx.field(static=True)  # a flat state
 
-    def frequency(self, y: Float[Array, " n"]) -> Float[Array, ""]:
-        """The highest frequency [rad/s] in flat state y."""
-        state = self.unravel(y)
-        speed = self.rotor_speed
-        if speed is None:
-            assert state.rotor is not None
-            speed = state.rotor.speed
-        of_gimbals = self.ripple * jnp.abs(state.gimbal_rate)
-        by_state = jnp.maximum(self.order * jnp.abs(speed), of_gimbals)
-        return jnp.maximum(jnp.max(by_state), self.steady)
+    def frequency(self, t: Float[Array, ""], y: Float[Array, " n"]) -> Float[Array, ""]:
+        """The highest frequency [rad/s] at time t [s] in flat state y."""
+        state, highest = self.unravel(y), [self.noise]
+        for cluster, order in zip(self.clusters, self.orders, strict=True):
+            own = state.own.get(cluster.name, NOTHING)
+            units = cluster.turning(t, own, jnp.zeros_like(own.y))
+            ripple = jnp.max(cluster.motor.order, initial=0.0)
+            highest.append(jnp.max(order * jnp.abs(units.rotor.rate)))
+            highest.append(jnp.max(ripple * jnp.abs(units.gimbal.rate)))
+        return jnp.max(jnp.stack(highest))
 
 
-def fastest_line(
-    satellite: Satellite, moments: ClusterMoments, unravel: Callable[[Array], State]
-) -> FastestLine:
+def fastest_line(satellite: Satellite, unravel: Callable[[Array], State]) -> FastestLine:
     """The lines of imbalance, of order tables, of gimbal motors, and the end of noise.
 
     Args:
-        moments: ``ClusterMoments.expand(satellite.cluster)``.
         unravel: a flat state.
     """
-    cluster, disturbance = satellite.cluster, satellite.disturbance
-    order, steady, ripple = _imbalance_order(satellite, moments), jnp.zeros(()), jnp.zeros(())
-    if disturbance is not None:
-        there = jnp.any(disturbance.coefficient > 0.0, axis=-1)
-        order = jnp.maximum(order, jnp.max(jnp.where(there, disturbance.order, 0.0), axis=1))
-        if disturbance.noise is not None:
-            tables = [s for each in disturbance.broadband for s in each if s is not None]
-            highest = jnp.max(jnp.stack([jnp.max(s.frequency) for s in tables]))
-            steady = 2.0 * jnp.pi * highest
-    if satellite.motor is not None:
-        ripple = jnp.max(satellite.motor.order)
-    speed = None if cluster.drive is not None else cluster.rotor_speed
-    return FastestLine(order, speed, steady, ripple, unravel)
+    clusters = satellite.clusters
+    orders = tuple(jnp.maximum(_imbalance_order(c), c.disturbance.strongest()) for c in clusters)
+    noise = jnp.stack([jnp.zeros(()), *(c.disturbance.highest for c in clusters)])
+    return FastestLine(clusters, orders, jnp.max(noise), unravel)
 
 
-def _imbalance_order(satellite: Satellite, moments: ClusterMoments) -> Float[Array, " cmg"]:
+def _imbalance_order(cluster: Cluster) -> Float[Array, " cmg"]:
     """The highest order (0, 1 or 2) of each rotor's imbalance."""
     largest = lambda values: jnp.max(jnp.abs(values), axis=(0, 2, 3))  # noqa: E731
-    J, c = moments.J, moments.c_H[:3]
+    J, c = cluster.moments.J, cluster.moments.c
     mean, first, second = (largest(J[..., part]) for part in (slice(1), slice(1, 3), slice(3, 5)))
     eccentric = largest(c[..., 1:3])
-    shakes = (first > NOTHING * mean) | (eccentric > NOTHING * satellite.cluster.rotor_mass)
-    seen = jnp.maximum(NOTHING * mean, FAINT * (first + eccentric) / 4.0)
+    shakes = (first > NOTHING_OF * mean) | (eccentric > NOTHING_OF * cluster.units.rotor_mass)
+    seen = jnp.maximum(NOTHING_OF * mean, FAINT * (first + eccentric) / 4.0)
     return jnp.where(second > seen, 2.0, jnp.where(shakes, 1.0, 0.0))
 
 
@@ -111,6 +99,6 @@ class ResolvingController(diffrax.AbstractAdaptiveStepSizeController):
         return keep, next_t0, self._within(next_t0, next_t1, y), *rest
 
     def _within(self, t0, t1, y):
-        omega = self.line.frequency(y)
+        omega = self.line.frequency(t0, y)
         longest = 2.0 * jnp.pi / STEPS / jnp.where(omega > 0.0, omega, 1.0)
         return jnp.where(omega > 0.0, jnp.minimum(t1, t0 + longest), t1)

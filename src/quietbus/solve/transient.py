@@ -18,7 +18,9 @@ from math import comb, factorial
 
 import numpy as np
 
-from quietbus.dynamics.vibration import Vibration, View, image_motions
+from quietbus.dynamics.vibration import Vibration
+from quietbus.dynamics.views import View, image_motions
+from quietbus.model.satellite import BUS, Satellite
 
 SEGMENT = 512  # instants at the most that are followed in one go
 CHIRP = 0.1  # [rad] phase that a changing speed may turn beyond an even one's in a step
@@ -26,6 +28,7 @@ NOTHING = 1e-9  # of the largest line: lines that are left out
 # modes slower than this share of a line's frequency lag behind, but ring in the slow motion alone
 SLOW_MODE = 0.01
 SLIGHT = 1e-5  # [rad/s] damping of all speeds, so that a free body's rest and drift are two modes
+SPREAD = 1.0  # of it, from memory to memory, so that ones that are alike are modes each
 
 
 @dataclass(frozen=True)
@@ -37,6 +40,7 @@ class Transient:
 
 
 def transient(
+    satellite: Satellite,
     time: np.ndarray,
     xi: np.ndarray,
     speeds: np.ndarray,
@@ -48,7 +52,7 @@ def transient(
 
     Args:
         time: (n,) [s], evenly spaced.
-        xi: (n, cmg, order, 12) steady response to each line.
+        xi: (n, cmg, order, m) steady response of the free bodies to each line.
         speeds: (n, cmg) of the rotors [rad/s].
         orders: (order,)
         bases: modes by the number of their instant; each serves the instants that it is nearest to.
@@ -56,7 +60,7 @@ def transient(
     """
     count, lines = len(time), xi.shape[1] * xi.shape[2]
     s = 1j * (speeds[:, :, None] * orders).reshape(count, lines)
-    xi = xi.reshape(count, lines, 12)
+    xi = xi.reshape(count, lines, xi.shape[-1])
     sizes = np.max(np.abs(xi), axis=(0, 2))
     some = sizes > NOTHING * np.max(sizes, initial=0.0)
     s, xi = s[:, some], xi[:, some]
@@ -72,7 +76,7 @@ def transient(
         z = _followed(modes, step, at, p, y, (around.start < start, around.stop <= count))
         rate[here] = _size(z, _bus_rate(modes.small) @ modes.V, 1)
         if len(seen):
-            image[here] = _size(z, seen @ _image_motions(modes.small) @ modes.V, len(seen))
+            image[here] = _size(z, _images(satellite, modes.small, view) @ modes.V, len(seen))
         y = z[-1] @ modes.V.T
     return Transient(rate, image)
 
@@ -90,9 +94,10 @@ class Modes:
     def of(cls, small: Vibration) -> "Modes":
         """Of equations of small vibration (NumPy)."""
         A, n = small.state_matrix(), len(small.M)
-        speed = np.arange(n, 2 * n)
         damped = A.copy()
-        damped[speed, speed] -= SLIGHT
+        damped[np.arange(n, 2 * n), np.arange(n, 2 * n)] -= SLIGHT
+        own = np.arange(2 * n, len(A))  # memories alike, in a row, have no modes each of its own
+        damped[own, own] -= SLIGHT * (2.0 + SPREAD * np.arange(len(own)))
         V = np.linalg.eig(damped)[1]
         W = np.linalg.inv(V)
         return cls(small, np.sum(W * (A @ V).T, axis=1), V, W)  # undamped to second order
@@ -113,63 +118,66 @@ def _segments(count: int, bases: Mapping[int, Modes]) -> list[tuple[int, int, in
 def _steady(modes: Modes, xi: np.ndarray, s: np.ndarray) -> np.ndarray:
     """p = W x_s (n, line, m) of responses xi (n, line, 12) at s (n or 1, line)."""
     W, small = modes.W, modes.small
-    n = len(small.M)
-    unit = np.eye(12)[-n:]  # with a rigid mount the plate's follow the bus's
-    by_pose = W[:, :n] @ unit + s[..., None, None] * (W[:, n : 2 * n] @ unit)
-    if small.control is not None:
-        memory = _memory(small, s)
-        gimbals = memory.shape[-2] - 3
-        by_angle, by_rate, by_integral = np.split(W[:, 2 * n :], [gimbals, 2 * gimbals], axis=1)
-        by_angle = by_angle + s[..., None, None] * by_rate
-        answer = by_angle @ memory[..., :gimbals, :] + by_integral @ memory[..., gimbals:, :]
-        by_pose[..., 9:] += answer
+    n, (ny, nz) = len(small.M), _memories(small)
+    by_pose = W[:, :n] + s[..., None, None] * W[:, n : 2 * n]
+    if ny + nz:
+        answer = _answer(small, s)
+        by_y, by_rate, by_z = np.split(W[:, 2 * n :], [ny, 2 * ny], axis=1)
+        by_y = by_y + s[..., None, None] * by_rate
+        columns = np.array(small.memory.layout.columns)
+        by_pose[..., columns] += by_y @ answer[..., :ny, :] + by_z @ answer[..., ny:, :]
     if len(s) == 1:
         return np.swapaxes(np.swapaxes(xi, 0, 1) @ np.swapaxes(by_pose[0], 1, 2), 0, 1)
     return (by_pose @ xi[..., None])[..., 0]
 
 
-def _memory(small: Vibration, s: np.ndarray) -> np.ndarray:
-    """``Vibration.memory`` at many s (n, line) in NumPy; of rotors that stand still nothing."""
-    control = small.control
-    assert control is not None
+def _answer(small: Vibration, s: np.ndarray) -> np.ndarray:
+    """``Vibration.answer`` at many s (n, line) in NumPy; of rotors that stand still nothing."""
+    memory, (ny, nz) = small.memory, _memories(small)
     standing = s == 0.0
     s = np.where(standing, 1j, s)[..., None, None]
-    m = control.by_angle.shape[1]
-    given = control.by_attitude + control.by_rate @ (s * np.eye(3) + _turning(small))
-    answer = np.concatenate(
-        [
-            control.by_angle + s * control.by_angle_rate,
-            np.broadcast_to(control.by_integral, (*s.shape[:-2], m + 3, 3)),
-        ],
-        axis=-1,
-    )
-    own = np.concatenate([np.repeat(s[..., 0] ** 2, m, -1), np.repeat(s[..., 0], 3, -1)], -1)
-    found = np.linalg.solve(own[..., None] * np.eye(m + 3) - answer, given)
+    turns = len(memory.layout.columns) // 3
+    turn = np.kron(np.eye(turns), _turning(small))
+    given = memory.by_pose + memory.by_rate @ (s * np.eye(3 * turns) + turn)
+    by_z = np.broadcast_to(memory.by_z, (*s.shape[:-2], ny + nz, nz))
+    back = np.concatenate([memory.by_y + s * memory.by_y_rate, by_z], axis=-1)
+    own = np.concatenate([np.repeat(s[..., 0] ** 2, ny, -1), np.repeat(s[..., 0], nz, -1)], -1)
+    found = np.linalg.solve(own[..., None] * np.eye(ny + nz) - back, given)
     return np.where(standing[..., None, None], 0.0, found)
 
 
+def _memories(small: Vibration) -> tuple[int, int]:
+    """Numbers of driven coordinates and of first-order memories."""
+    return small.memory.layout.driven, small.memory.layout.kept
+
+
 def _turning(small: Vibration) -> np.ndarray:
-    return np.cross(small.slow.plates.w_B, np.eye(3)).T
+    return np.cross(small.slow.now.motions[BUS].w, np.eye(3)).T
 
 
 def _bus_rate(small: Vibration) -> np.ndarray:
     """(3, m): deviation of the bus's rate by states."""
-    n, m = _sizes(small)
-    matrix = np.zeros((3, m))
-    matrix[:, n - 3 : n], matrix[:, 2 * n - 3 : 2 * n] = _turning(small), np.eye(3)
+    n, rows = len(small.M), small.rows
+    matrix = np.zeros((3, _states(small)))
+    matrix[:, rows] = _turning(small)
+    matrix[:, n + rows.start : n + rows.stop] = np.eye(3)
     return matrix
 
 
-def _image_motions(small: Vibration) -> np.ndarray:
-    """(12, m): what moves images by states."""
-    whole = np.eye(12) if small.projection is None else small.projection
-    return np.asarray(image_motions(small.slow.plates.p_BP)) @ whole @ np.eye(*_sizes(small))
+def _images(satellite: Satellite, small: Vibration, view: View) -> np.ndarray:
+    """(line, 3, m): motion of images by states."""
+    layout, motions = small.slow.now.layout, small.slow.now.motions
+    images = []
+    for line, (on, of) in zip(view.line_of_sight, view.bodies(satellite), strict=True):
+        x_on, x_of = (small.projection[layout.rows(body)] for body in (on, of))
+        images.append(line @ np.asarray(image_motions(motions[on], motions[of], x_on, x_of)))
+    return np.pad(np.stack(images), ((0, 0), (0, 0), (0, _states(small) - len(small.M))))
 
 
-def _sizes(small: Vibration) -> tuple[int, int]:
-    """Numbers of displacements and of states."""
-    n = len(small.M)
-    return n, 2 * n + (0 if small.control is None else 2 * small.control.by_angle.shape[1] + 3)
+def _states(small: Vibration) -> int:
+    """Number of states."""
+    ny, nz = _memories(small)
+    return 2 * len(small.M) + 2 * ny + nz
 
 
 def _size(z: np.ndarray, output: np.ndarray, count: int) -> np.ndarray:

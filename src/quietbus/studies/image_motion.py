@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from quietbus.analysis.pointing.motion import ImageMotion, Lines, SampledSignal
 from quietbus.analysis.pointing.noise import Noise
+from quietbus.model.body import body_quantities
 from quietbus.results import AXES, method_of, scenario_of
 from quietbus.scenario import Scenario
 
@@ -36,9 +37,9 @@ def image_motion(
     if name not in scenario.lines_of_sight:
         known = ", ".join(scenario.lines_of_sight) or "none"
         raise ValueError(f"line of sight: expected one of {known}; got {name!r}")
-    line = scenario.lines_of_sight[name]
+    line, on = scenario.sight(name), scenario.seen_from(name)
     time = run["time"].to_numpy()
-    signal = SampledSignal(time, body_errors(run, scenario) @ (line.image() @ line.matrix()).T)
+    signal = SampledSignal(time, body_errors(run, scenario, on) @ (line.image() @ line.matrix()).T)
     if not method_of(run).jitter_apart:
         return ImageMotion(signal)
     amplitude, shift = (
@@ -52,7 +53,7 @@ def image_motion(
     orders = run["order"].to_numpy()
     if np.any(run.get("line_of_sight_ripple_amplitude", 0.0)):
         raise ValueError(RIPPLE)
-    speed, phase = rotors_of(run, scenario, stretch)
+    speed, phase = rotors_of(run, stretch)
     lines = Lines(
         amplitude=image.reshape(len(time), -1, image.shape[-1]),
         frequency=np.outer(speed, orders).ravel(),
@@ -64,17 +65,13 @@ def image_motion(
 
 
 def rotors_of(
-    run: xr.Dataset, scenario: Scenario, stretch: tuple[float, float] | None
+    run: xr.Dataset, stretch: tuple[float, float] | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Speeds [rad/s] of the rotors and their angles at t = 0 [rad], as of steady ones.
 
     Raises:
         ValueError: a speed that changes within the stretch.
     """
-    units = scenario.cluster.placed()
-    if "rotor_speed" not in run:
-        speed = np.array([unit.rotor.speed if unit.rotor else 0.0 for unit in units])
-        return speed, np.array(scenario.cluster.phases())
     time = run["time"].to_numpy()
     start, end = stretch or (time[0], time[-1])
     here = (time >= start - 1e-9) & (time <= end + 1e-9)
@@ -111,21 +108,34 @@ def _noise(run: xr.Dataset, name: str, image: np.ndarray) -> Noise | None:
     return Noise(run["look"].to_numpy(), run["frequency"].to_numpy(), density, names)
 
 
-def body_errors(run: xr.Dataset, scenario: Scenario) -> np.ndarray:
-    """(n, 12) motions in the order of a sensitivity's columns, along bus axes."""
-    bus, plate = (
-        Rotation.from_quat(run[f"{body}_attitude"].to_numpy(), scalar_first=True)
-        for body in ("bus", "platform")
-    )
-    p_NB, p_NP = (run[f"{body}_position"].to_numpy() for body in ("bus", "platform"))
-    isolator = scenario.isolator
-    base = Rotation.from_euler("ZYX", isolator.orientation[::-1])
-    place = isolator.offset + base.apply([0.0, 0.0, isolator.separation])
-    return np.hstack(
-        [
-            run["attitude_error"].to_numpy(),
-            bus.inv().apply(p_NB),
-            (bus.inv() * plate * base.inv()).as_rotvec(),
-            bus.inv().apply(p_NP - p_NB) - place,
-        ]
-    )
+def body_errors(run: xr.Dataset, scenario: Scenario, on: str = "bus") -> np.ndarray:
+    """(n, 12) motions in the order of a sensitivity's columns, along bus axes.
+
+    Args:
+        on: the body that a line of sight is on.
+    """
+    turn, shift = run["attitude_error"].to_numpy(), _of(run, "bus", "position")
+    bus = Rotation.from_quat(_of(run, "bus", "attitude"), scalar_first=True)
+    shift = bus.inv().apply(shift)
+
+    def from_place(body: str) -> tuple[np.ndarray, np.ndarray]:
+        """Turn and displacement of a body from its place in the bus."""
+        if body == "bus":
+            return 0.0 * turn, 0.0 * turn
+        place, nominal = scenario.place(body)
+        own = Rotation.from_quat(_of(run, body, "attitude"), scalar_first=True)
+        p = bus.inv().apply(_of(run, body, "position") - _of(run, "bus", "position"))
+        return (bus.inv() * own * nominal.inv()).as_rotvec(), p - place
+
+    here, there = from_place(on), from_place(scenario.seen_with(on))
+    place, other = scenario.place(on)[0], scenario.place(scenario.seen_with(on))[0]
+    whole = turn + here[0]
+    # of the other body from its place in this one: what this one's turn takes it along comes off
+    moved = there[1] - here[1] - np.cross(here[0], other - place)
+    moved_along = shift + np.cross(turn, place) * (on != "bus") + here[1]
+    return np.hstack([whole, moved_along, there[0] - here[0], moved])
+
+
+def _of(run: xr.Dataset, body: str, kind: str) -> np.ndarray:
+    """A quantity of a body, by its name in the run."""
+    return run[body_quantities(body)[kind].name].to_numpy()

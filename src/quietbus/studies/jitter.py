@@ -1,7 +1,7 @@
 """Jitter of a scenario at one operating point (``quietbus jitter``)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.metadata import version
 from typing import Any
@@ -33,13 +33,16 @@ from quietbus.analysis.jitter.worst import WorstAngles, worst_angles
 from quietbus.arguments import choice, listing, positive
 from quietbus.arguments import count as whole
 from quietbus.build import build_satellite
-from quietbus.dynamics.vibration import NOTHING_SEEN, Vibration
-from quietbus.model.cmg import ORDERS
+from quietbus.dynamics.rotor_response import orders_of
+from quietbus.dynamics.vibration import Vibration
+from quietbus.dynamics.views import NOTHING_SEEN
+from quietbus.model.moments import ORDERS
 from quietbus.model.satellite import Satellite
+from quietbus.model.variants import with_rotor_speed
 from quietbus.plain import ARCSEC, json_ready
 from quietbus.scenario import Scenario, ScenarioError
-from quietbus.solve.harmonic import ResonanceError, refuse_resonance
-from quietbus.solve.noise import Broadband, noise_spectra
+from quietbus.solve.noise import Broadband, noise_spectra, noisy
+from quietbus.solve.validity import ResonanceError, refuse_resonance
 
 MOUNTS = ("isolated", "rigid")
 SWEPT = 1.2  # times the rotors' own speed: where a sweep ends unless told otherwise
@@ -81,12 +84,13 @@ class JitterStudy:
                     "--method harmonic`"
                 )
             modes = np.linalg.eigvals(small.state_matrix())
-            refuse_resonance(self.satellite(mount), f"with mount {mount}", modes)
+            speeds = np.asarray(self.satellite(mount).rotor_speed)
+            refuse_resonance(self.satellite(mount), f"with mount {mount}", modes, speeds)
 
     @property
-    def wheels(self) -> bool:
-        """Whether the units are reaction wheels: there are no gimbal angles to search then."""
-        return self.satellite("isolated").cluster.wheels
+    def held(self) -> bool:
+        """Whether no gimbal turns, as with wheels: there are no angles to search then."""
+        return not self.satellite("isolated").steered
 
     def satellite(self, mount: str) -> Satellite:
         """Parameters of the model."""
@@ -99,12 +103,12 @@ class JitterStudy:
     @property
     def orders(self) -> tuple[float, ...]:
         """Multiples of rotor speed: of imbalance, and of the rotors' tables."""
-        return self.scenario.cluster.orders
+        return orders_of(self.satellite("isolated"))
 
     @cached_property
     def frequency(self) -> np.ndarray:
         """(cmg, order) [rad/s]."""
-        return np.outer(self.satellite("isolated").cluster.rotor_speed, self.orders)
+        return np.outer(self.satellite("isolated").rotor_speed, self.orders)
 
     @cached_property
     def _at_rest(self) -> dict[str, tuple[dict[str, np.ndarray], Vibration]]:
@@ -139,7 +143,7 @@ class JitterStudy:
         """All rotors and orders together, in the output's unit."""
         outputs = self.outputs[choice("mount", mount, MOUNTS)]
         values = outputs[choice("output", output, list(outputs))]
-        phase = np.outer(self.satellite(mount).cluster.rotor_phase, self.orders)
+        phase = np.outer(self.satellite(mount).rotor_phase, self.orders)
         combined = combine(values, self.frequency, phase)
         noise = self.noise(mount)
         return combined if noise is None else combined.with_noise(noise.variance(output, 1)[0])
@@ -157,7 +161,7 @@ class JitterStudy:
         for mount in MOUNTS:
             satellite, small = self.satellite(mount), self._at_rest[mount][1]
             found[mount] = None
-            if satellite.disturbance is not None and satellite.disturbance.noisy:
+            if noisy(satellite):
                 modes = np.linalg.eigvals(jax.tree.map(lambda leaf: leaf[0], small).state_matrix())
                 spectra = noise_spectra(satellite, small, modes, NOTHING_SEEN)
                 found[mount] = Broadband(np.zeros(1, int), *spectra)
@@ -171,7 +175,8 @@ class JitterStudy:
     @property
     def kinds(self) -> tuple[str, ...]:
         """What the budget tells apart."""
-        return KINDS[:-1] if self.satellite("isolated").disturbance is None else KINDS
+        tables = (c.disturbance.tables() for c in self.satellite("isolated").clusters)
+        return KINDS if any(np.any(table) for table in tables) else KINDS[:-1]
 
     @cached_property
     def budget(self) -> dict[str, np.ndarray]:
@@ -185,11 +190,17 @@ class JitterStudy:
 
     def worst(self, mount: str) -> WorstAngles:
         """Gimbal angles with the largest ``worst_case_norm`` of the bus rate [rad/s]."""
-        same = [self.satellite(mount)] * SEARCHED
-        return worst_angles(
-            lambda angles: worst_case_norm(jitter_of_designs(same, angles)["bus_rate"]),
-            len(self.gimbal_angle),
-        )
+        same, turning = [self.satellite(mount)] * SEARCHED, list(self.satellite(mount).steered)
+
+        def measure(sought: np.ndarray) -> np.ndarray:
+            angles = np.tile(self.gimbal_angle, (SEARCHED, 1))
+            angles[:, turning] = sought
+            return worst_case_norm(jitter_of_designs(same, angles)["bus_rate"])
+
+        found = worst_angles(measure, len(turning))
+        angle = self.gimbal_angle.copy()
+        angle[turning] = found.gimbal_angle
+        return replace(found, gimbal_angle=angle)
 
     def sweep(self, max_speed: float | None = None, count: int = 256) -> SpeedSweep:
         """Jitter and modes as the speed of all rotors rises together from rest.
@@ -205,7 +216,7 @@ class JitterStudy:
         count = whole("count", count, least=2)
         if max_speed is not None:
             positive("max_speed", max_speed)
-        own = np.asarray(self.satellite("isolated").cluster.rotor_speed)
+        own = np.asarray(self.satellite("isolated").rotor_speed)
         fastest = float(np.max(np.abs(own)))
         if fastest == 0.0:
             raise ValueError("a sweep of the rotors' speed needs one that turns")
@@ -226,7 +237,7 @@ class JitterStudy:
             rate = self._at_speeds(mount, factor)[0]["bus_rate"]
             rate[factor == 0.0] = 0.0  # steering by standing rotors has no meaning
             bus_rate[mount] = rate
-        phase = np.asarray(self.satellite("isolated").cluster.rotor_phase)
+        phase = np.asarray(self.satellite("isolated").rotor_phase)
         return SpeedSweep(
             factor,
             own,
@@ -237,17 +248,15 @@ class JitterStudy:
             critical,
             bearing_modes(own_rotors),
             inner,
-            () if self.wheels else tuple(self.gimbal_angle),
+            () if self.held else tuple(self.gimbal_angle),
         )
 
     def _at_speeds(
         self, mount: str, factors: np.ndarray
     ) -> tuple[dict[str, np.ndarray], Vibration]:
         own = self.satellite(mount)
-        designs = [
-            eqx.tree_at(lambda s: s.cluster.rotor_speed, own, factor * own.cluster.rotor_speed)
-            for factor in factors
-        ]
+        speed = np.asarray(own.rotor_speed)
+        designs = [with_rotor_speed(own, jnp.asarray(factor * speed)) for factor in factors]
         return _compute(
             designs, np.broadcast_to(self.gimbal_angle, (len(designs), len(self.gimbal_angle)))
         )
@@ -292,9 +301,11 @@ class JitterStudy:
         except ScenarioError:  # at the end of what the scenario allows, zero say
             offsets, weights = _FORWARD
             built = [parameters(offset) for offset in offsets]
+        # where there is no limit it is infinite, and stays so
+        finite = [jax.tree.map(lambda leaf: np.where(np.isinf(leaf), 0.0, leaf), b) for b in built]
         return jax.tree.map(
             lambda *each: sum(w * leaf for w, leaf in zip(weights, each, strict=True)) / step,
-            *built,
+            *finite,
         )
 
     def to_dict(self, max_speed: float | None = None) -> dict[str, Any]:
@@ -303,7 +314,7 @@ class JitterStudy:
         Args:
             max_speed: where the sweep ends, as of ``sweep``; there is none if no rotor turns.
         """
-        own = self.scenario.isolator.mount
+        own = self.scenario.mount
         size = {mount: np.abs(self.bus_rate(mount)) for mount in MOUNTS}
         turn = {mount: np.abs(self.outputs[mount]["bus_attitude"]) for mount in MOUNTS}
         orders = [
@@ -327,7 +338,7 @@ class JitterStudy:
         together = {mount: self._combined_dict(mount) for mount in MOUNTS}
         envelope = {mount: self.combined(mount).envelope for mount in MOUNTS}
         worst = {}
-        for mount in () if self.wheels else MOUNTS:
+        for mount in () if self.held else MOUNTS:
             found = self.worst(mount)
             worst[mount] = {
                 "gimbal_angle_deg": np.rad2deg(found.gimbal_angle),
@@ -390,7 +401,7 @@ def worst_over_phases(
     scenario: Scenario,
     mount: str,
     gimbal_angle: np.ndarray,
-    rotor_speed: np.ndarray | None = None,
+    rotor_speed: np.ndarray,
 ) -> np.ndarray | None:
     """(3,) bus rate [rad/s] with the worst rotor phases: the sum of all lines' amplitudes.
 
@@ -398,18 +409,17 @@ def worst_over_phases(
 
     Args:
         gimbal_angle: (cmg,) [rad].
-        rotor_speed: (cmg,) [rad/s], instead of the scenario's own.
+        rotor_speed: (cmg,) [rad/s].
     """
-    satellite = build_satellite(scenario, mount)  # type: ignore[arg-type]
-    if rotor_speed is not None:
-        speed = jnp.asarray(rotor_speed)
-        satellite = eqx.tree_at(lambda s: s.cluster.rotor_speed, satellite, speed)
+    built = build_satellite(scenario, mount)  # type: ignore[arg-type]
+    satellite = with_rotor_speed(built, jnp.asarray(rotor_speed))
     outputs, small = _compute([satellite], gimbal_angle[None])
     small = jax.tree.map(lambda leaf: leaf[0], small)
     if rest_error(small) > AT_REST:
         return None
     try:
-        refuse_resonance(satellite, "", np.linalg.eigvals(small.state_matrix()))
+        modes = np.linalg.eigvals(small.state_matrix())
+        refuse_resonance(satellite, "", modes, np.asarray(satellite.rotor_speed))
     except ResonanceError:
         return None
     return np.sum(np.abs(outputs["bus_rate"][0]), axis=(0, 1))

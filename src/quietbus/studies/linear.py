@@ -1,6 +1,6 @@
 """Everything that linear analysis says of a scenario (``quietbus analyze``)."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
 from typing import Any
@@ -24,15 +24,21 @@ from quietbus.arguments import array, choice
 from quietbus.build import build_satellite
 from quietbus.dynamics.linearize import (
     AXES,
-    Actuator,
+    Actuation,
     LinearModel,
     OperatingPoint,
-    clamped,
     linearize,
     platform_inertia,
 )
+from quietbus.model.body import Mount
 from quietbus.model.satellite import Satellite
-from quietbus.model.variants import without_friction, without_leg_mass, without_rotation
+from quietbus.model.variants import (
+    with_base_fixed,
+    with_mount,
+    without_friction,
+    without_leg_mass,
+    without_rotation,
+)
 from quietbus.plain import json_ready
 from quietbus.scenario import Scenario
 from quietbus.spatial.rotation import quaternion_to_matrix
@@ -59,6 +65,11 @@ class Study:
         """Isolated, whatever the scenario's mount: the analysis is of the platform."""
         return build_satellite(self.scenario, "isolated")
 
+    @property
+    def _platform(self) -> Mount:
+        """The platform that is analysed."""
+        return self.satellite.mounts[0]
+
     @cached_property
     def pid(self) -> PID | None:
         """The scenario's controller; None without one, or if all its gains are zero."""
@@ -70,12 +81,12 @@ class Study:
     def notes(self) -> list[str]:
         """What the user has to know of how the scenario was analysed."""
         notes = []
-        if self.scenario.isolator.mount == "rigid":
+        if self.scenario.mount == "rigid":
             notes.append("The scenario's mount is rigid; what is analysed is the platform's.")
         if self.pid is None:
             which = "has no control" if self.scenario.control is None else "has gains of zero only"
             notes.append(f"The scenario {which}: no loop to analyse, those parts are empty.")
-        elif self.satellite.steering is None:
+        elif not self.satellite.control.steering.acts:
             notes.append(
                 "The scenario lets no unit act (steering: none), so that a run feels no control; "
                 "the loop is analysed as if the plate received the torque that is asked for."
@@ -84,7 +95,7 @@ class Study:
             notes.append(self.channels.verdict)
         return notes
 
-    def linear(self, actuator: Actuator = "servo") -> LinearModel:
+    def linear(self, actuator: Actuation = "servo") -> LinearModel:
         """The free satellite, linearised."""
         choice("actuator", actuator, ("servo", "ideal"))
         return linearize(self.satellite, self.point, actuator)
@@ -92,21 +103,23 @@ class Study:
     @cached_property
     def channels(self) -> Channels:
         """Torque channels of the platform on a fixed base, massless legs (eq. 31-33)."""
-        isolator, legs = self.scenario.isolator, self.satellite.legs
-        mass, center, inertia = platform_inertia(self.satellite, self.gimbal_angle)
+        isolator, (legs, *_) = self.scenario.sites[0].isolator, self.satellite.hexapods
+        name = self._platform.body
+        mass, center, inertia = platform_inertia(self.satellite, self.gimbal_angle, name)
+        stiffness, damping = map(np.asarray, legs.strut.tangent(legs.geometry.nominal_length))
         base = np.asarray(isolator.offset)
-        R_BP = np.asarray(quaternion_to_matrix(self.satellite.q_BP))
-        plate = np.asarray(self.satellite.p_BP_B) - base
+        R_BP = np.asarray(quaternion_to_matrix(self._platform.q_BX))
+        plate = np.asarray(self._platform.p_BX_B) - base
         return channels(
             hexapod_isolator(  # all from the base plate's centre, in bus axes
-                upper_joints=plate + np.asarray(legs.p_PU_P) @ R_BP.T,
-                lower_joints=np.asarray(legs.p_BA_B) - base,
+                upper_joints=plate + np.asarray(legs.geometry.p_PU_P) @ R_BP.T,
+                lower_joints=np.asarray(legs.geometry.p_BA_B) - base,
                 separation=0.0,
                 mass=mass,
                 inertia=R_BP @ inertia @ R_BP.T,
                 center_of_mass=plate + R_BP @ center,
-                stiffness=np.asarray(legs.stiffness),
-                damping=np.asarray(legs.damping),
+                stiffness=stiffness,
+                damping=damping,
             )
         )
 
@@ -147,11 +160,11 @@ class Study:
     @property
     def _ideal(self) -> str:
         """Units that do at once what they are asked for."""
-        return "ideal wheels" if self.satellite.cluster.wheels else "ideal gimbals"
+        return "ideal wheels" if not self.satellite.steered else "ideal gimbals"
 
     @property
-    def _actuator(self) -> Actuator:
-        return "ideal" if self.satellite.steering is None else "servo"
+    def _actuator(self) -> Actuation:
+        return "ideal" if not self.satellite.control.steering.acts else "servo"
 
     @cached_property
     def coupled(self) -> CoupledAnalysis | None:
@@ -180,14 +193,16 @@ class Study:
             "with joint friction": light,
             "with leg mass": still,
         }
-        if self.satellite.steering is not None:
+        if self.satellite.control.steering.acts:
             steps["with rotor momentum"] = self.satellite
         results = {
             case: analyze_coupled(controlled(linearize(satellite, self.point, "ideal"), self.pid))
             for case, satellite in steps.items()
         }
-        by = "the wheels' motion" if self.satellite.cluster.wheels else "gimbal servo"
-        last = "with rotor momentum" if self.satellite.steering is None else f"with {by}: all"
+        by = "the wheels' motion" if not self.satellite.steered else "gimbal servo"
+        last = (
+            "with rotor momentum" if not self.satellite.control.steering.acts else f"with {by}: all"
+        )
         results[last] = self.coupled
         rows += [
             {
@@ -203,24 +218,23 @@ class Study:
     @cached_property
     def modes(self) -> dict[str, list[Mode]]:
         """Modes with the base fixed and of the free satellite, gimbals held."""
-        fixed = linearize(clamped(self.satellite), self.point, "ideal")
+        fixed = linearize(with_base_fixed(self.satellite), self.point, "ideal")
         return {"fixed_base": fixed_base_modes(fixed), "free": free_modes(self.linear("ideal"))}
 
     @property
     def vertical_isolator(self) -> SingleAxisIsolator:
         """The platform as one mass on one strut, along the base plate's z axis."""
-        legs = self.satellite.legs
-        lower, upper = self.scenario.isolator.joints()
+        legs = self.satellite.hexapods[0]
+        stiffness, damping = map(np.asarray, legs.strut.tangent(legs.geometry.nominal_length))
+        lower, upper = self.scenario.sites[0].isolator.joints()
         along = ((upper - lower)[:, 2] / np.linalg.norm(upper - lower, axis=1)) ** 2
-        mass = platform_inertia(self.satellite, self.gimbal_angle)[0]
-        return SingleAxisIsolator(
-            mass, float(along @ np.asarray(legs.stiffness)), float(along @ np.asarray(legs.damping))
-        )
+        mass = platform_inertia(self.satellite, self.gimbal_angle, self._platform.body)[0]
+        return SingleAxisIsolator(mass, float(along @ stiffness), float(along @ damping))
 
     @property
     def rotor_frequencies_hz(self) -> np.ndarray:
         """Frequencies [Hz] at which rotors turn, ascending; 100 Hz if none does."""
-        turns = np.abs(np.asarray(self.satellite.cluster.rotor_speed)) / (2.0 * np.pi)
+        turns = np.abs(np.asarray(self.satellite.rotor_speed)) / (2.0 * np.pi)
         distinct = np.unique(np.round(turns[turns > 0.0], 9))
         return distinct if distinct.size else np.array([100.0])
 
@@ -229,13 +243,13 @@ class Study:
         frequency_hz = array("frequency_hz", frequency_hz, "frequencies in Hz above 0").reshape(-1)
         if not np.all(frequency_hz > 0.0):
             raise ValueError("frequency_hz: expected frequencies above 0 Hz")
-        rigid = replace(self.satellite, mount="rigid")
+        rigid = with_mount(self.satellite, welded=True)
         places = Places(
-            mass=float(self.satellite.bus.mass),
-            inertia=np.asarray(self.satellite.bus.I_BBcm_B),
-            base=np.asarray(self.scenario.isolator.offset),
-            R_BP=np.asarray(quaternion_to_matrix(self.satellite.q_BP)),
-            center=platform_inertia(self.satellite, self.gimbal_angle)[1],
+            mass=float(self.satellite.bus.mass_X),
+            inertia=np.asarray(self.satellite.bus.I_XXcm_X),
+            base=np.asarray(self.scenario.sites[0].isolator.offset),
+            R_BP=np.asarray(quaternion_to_matrix(self._platform.q_BX)),
+            center=platform_inertia(self.satellite, self.gimbal_angle, self._platform.body)[1],
         )
         return transmissibility(
             self.linear("ideal"), linearize(rigid, self.point, "ideal"), places, frequency_hz
@@ -286,6 +300,6 @@ class Study:
 
 def at_height(satellite: Satellite, height: float) -> Satellite:
     """The satellite with its platform moved along bus z, so that its plate is at ``height`` [m]."""
-    shift = np.array([0.0, 0.0, height - float(satellite.p_BP_B[2])])
-    places = lambda s: (s.p_BP_B, s.legs.p_BA_B)  # noqa: E731
+    shift = np.array([0.0, 0.0, height - float(satellite.mounts[0].p_BX_B[2])])
+    places = lambda s: (s.mounts[0].p_BX_B, s.hexapods[0].geometry.p_BA_B)  # noqa: E731
     return eqx.tree_at(places, satellite, tuple(value + shift for value in places(satellite)))

@@ -4,22 +4,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+import jax
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.integrate import trapezoid
 
 from quietbus.analysis.control.coupled import CoupledAnalysis, analyze_coupled
 from quietbus.analysis.control.pid import PID
 from quietbus.analysis.jitter.combine import Combined, combine
 from quietbus.analysis.jitter.lines import AT_REST
-from quietbus.analysis.jitter.platforms import Platforms
+from quietbus.analysis.jitter.platforms import MOUNTS, Platforms
 from quietbus.arguments import choice, vector
 from quietbus.build import build_satellite
+from quietbus.dynamics.views import NOTHING_SEEN
 from quietbus.scenario import Problem, Scenario, ScenarioError
 from quietbus.scenario.checks import listed
-from quietbus.scenario.wheels import WheelCluster
-from quietbus.solve.harmonic import refuse_resonance
-from quietbus.solve.noise import frequency_grid
+from quietbus.solve.noise import Broadband, noise_spectra, noisy
+from quietbus.solve.validity import refuse_resonance
 
 SHARED = ("bus", "control")  # what is the satellite's and not a platform's
 
@@ -45,7 +45,7 @@ class PlatformStudy:
     def __post_init__(self) -> None:
         _check_shared(self.scenarios)
         for scenario in self.scenarios:
-            if isinstance(scenario.cluster, WheelCluster):
+            if scenario.units.wheels:
                 said = "expected cmg, since several platforms are for CMGs only; got wheel"
                 raise ScenarioError(scenario.name, [Problem(said, ("cluster", "type"))])
         error = self.platforms.rest_error
@@ -55,10 +55,11 @@ class PlatformStudy:
                 f"platform accelerates by {error:.3g} (SI). Take the struts' preload away "
                 "(isolator.legs.free_length)"
             )
-        for mount, small in (("isolated", self.platforms.small), ("rigid", self.platforms.bolted)):
-            modes = np.linalg.eigvals(small.state_matrix())
-            for i, satellite in enumerate(self.platforms.satellites):
-                refuse_resonance(satellite, f"with mount {mount} of platform {i}", modes)
+        for mount in MOUNTS:
+            modes = np.linalg.eigvals(self.platforms.small(mount).state_matrix())
+            satellite = self.platforms.satellite
+            where = f"with mount {mount} of all platforms"
+            refuse_resonance(satellite, where, modes, np.asarray(satellite.rotor_speed))
 
     @cached_property
     def platforms(self) -> Platforms:
@@ -69,50 +70,46 @@ class PlatformStudy:
         ]
         return Platforms.assemble(satellites, self.gimbal_angles)
 
-    @cached_property
-    def _responses(self) -> dict[str, np.ndarray]:
-        return {mount: self.platforms.response(mount) for mount in ("isolated", "rigid")}
-
     def bus_attitude(self, mount: str) -> np.ndarray:
         """Complex amplitudes (cmg, order, axis) [rad], CMGs counted through all platforms."""
-        return self._responses[choice("mount", mount, ("isolated", "rigid"))][..., -3:]
+        return self.platforms.outputs(choice("mount", mount, MOUNTS))["bus_attitude"]
 
     def bus_rate(self, mount: str) -> np.ndarray:
         """Complex amplitudes (cmg, order, axis) [rad/s]."""
-        return 1j * self.platforms.frequency[..., None] * self.bus_attitude(mount)
+        return self.platforms.outputs(choice("mount", mount, MOUNTS))["bus_rate"]
 
     def leg_stroke(self) -> tuple[np.ndarray, ...]:
         """Complex amplitudes (cmg, order, leg) [m] of each platform's legs, by every CMG."""
-        return self.platforms.strokes(self._responses["isolated"])
+        return self._by_platform(self.platforms.outputs("isolated")["leg_stroke"])
+
+    def _by_platform(self, strokes: np.ndarray) -> tuple[np.ndarray, ...]:
+        """What is of all legs (..., leg), by platform."""
+        legs = [len(h.geometry.nominal_length) for h in self.platforms.satellite.hexapods]
+        return tuple(np.split(strokes, np.cumsum(legs)[:-1], axis=-1))
 
     def combined(self, mount: str) -> Combined:
         """Bus rate of all rotors and orders together [rad/s]; noise is in the RMS alone."""
-        phases = [s.cluster.rotor_phase for s in self.platforms.satellites]
-        angles = np.outer(np.concatenate(phases), self.platforms.orders)
+        angles = np.outer(self.platforms.satellite.rotor_phase, self.platforms.orders)
         combined = combine(self.bus_rate(mount), self.platforms.frequency, angles)
         return combined.with_noise(self._noise_square[mount])
 
     @cached_property
     def _noise_square(self) -> dict[str, np.ndarray]:
         """(axis,) mean square of the bus rate by noise, by mount [rad^2/s^2]."""
-        found = {}
-        for mount, small in (("isolated", self.platforms.small), ("rigid", self.platforms.bolted)):
-            modes = np.linalg.eigvals(small.state_matrix())
-            grids = [
-                frequency_grid(satellite, modes)
-                for satellite in self.platforms.satellites
-                if satellite.disturbance is not None and satellite.disturbance.noisy
-            ]
+        found, satellite = {}, self.platforms.satellite
+        for mount in MOUNTS:
             found[mount] = np.zeros(3)
-            if grids:
-                frequency = np.unique(np.concatenate(grids))
-                psd = self.platforms.noise_psd(frequency, mount)
-                found[mount] = trapezoid(psd.sum(axis=1), frequency, axis=0)
+            if noisy(satellite):
+                small = self.platforms.small(mount)
+                modes = np.linalg.eigvals(small.state_matrix())
+                small = jax.tree.map(lambda leaf: np.asarray(leaf)[None], small)
+                spectra = noise_spectra(self.platforms.mounted(mount), small, modes, NOTHING_SEEN)
+                found[mount] = Broadband(np.zeros(1, int), *spectra).variance("bus_rate", 1)[0]
         return found
 
     def static_stroke(self, torque: ArrayLike) -> tuple[np.ndarray, ...]:
         """Strokes (leg,) [m] of each platform's legs as a control torque [N m] sets in."""
-        return self.platforms.strokes(self.platforms.turned(vector("torque", torque, 3)))
+        return self._by_platform(self.platforms.strokes_by(vector("torque", torque, 3)))
 
     @property
     def pid(self) -> PID | None:
@@ -126,8 +123,8 @@ class PlatformStudy:
         """Gain range and margins of the attitude loop, all axes and platforms together."""
         if self.pid is None:
             return None
-        held = self.platforms.satellites[0].steering is None
-        return analyze_coupled(self.platforms.controlled(self.pid, "ideal" if held else "servo"))
+        steered = self.platforms.satellite.control.steering.acts
+        return analyze_coupled(self.platforms.controlled(self.pid, "servo" if steered else "ideal"))
 
 
 def _first_units(scenarios: Sequence[Scenario]) -> list[int]:
@@ -137,7 +134,7 @@ def _first_units(scenarios: Sequence[Scenario]) -> list[int]:
         range(len(scenarios)), key=lambda i: (scenarios[i].name, scenarios[i].to_yaml())
     ):
         found[i] = first
-        first += scenarios[i].cluster.count
+        first += scenarios[i].units.count
     return found
 
 
@@ -155,11 +152,11 @@ def _check_shared(scenarios: Sequence[Scenario]) -> None:
             for key in SHARED
             if getattr(other, key) != getattr(first, key)
         ]
-        if other.cluster.orders != first.cluster.orders:
+        if other.units.orders != first.units.orders:
             problems.append(
                 Problem(
-                    f"expected the orders of '{first.name}', {listed(first.cluster.orders)}, for "
-                    f"the rotors of every platform, got {listed(other.cluster.orders)}",
+                    f"expected the orders of '{first.name}', {listed(first.units.orders)}, for "
+                    f"the rotors of every platform, got {listed(other.units.orders)}",
                     ("cluster", "rotor", "disturbance", "orders"),
                 )
             )

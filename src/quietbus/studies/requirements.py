@@ -43,7 +43,7 @@ def check_requirements(scenario: Scenario, method: Method | type[Method], last: 
     if too_coarse:
         text = f"{too_coarse}. Use method 'harmonic', or raise simulation.output_rate"
         problems.append(Problem(text, ("requirements",)))
-    if method.jitter_apart and scenario.cluster.gimbal_motor and _gimbals_move(scenario):
+    if method.jitter_apart and scenario.units.ripple and _gimbals_move(scenario):
         problems.append(Problem(RIPPLE, ("requirements",)))
     highest = _highest_noise(scenario) if method.jitter_apart else 0.0
     for i, requirement in enumerate(scenario.requirements):
@@ -77,7 +77,7 @@ def _highest_noise(scenario: Scenario) -> float:
     """Highest frequency [Hz] of the rotors' broadband disturbance; 0 without."""
     ends = [
         spectrum.frequency[-1]
-        for unit in scenario.cluster.placed()
+        for unit in scenario.units.placed()
         if unit.rotor and unit.rotor.disturbance
         for spectrum in unit.rotor.disturbance.broadband.given().values()
     ]

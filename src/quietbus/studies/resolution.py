@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from quietbus.analysis.signals.residual import RESOLVING, shows
+from quietbus.dynamics.rotor_response import orders_of
 from quietbus.scenario import Problem, Scenario, ScenarioError
-from quietbus.solve.harmonic import steady_speeds
+from quietbus.solve.periodic import steady_speeds
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -41,12 +42,8 @@ def _declared(scenario: Scenario, speed: np.ndarray | None = None) -> Iterator[t
     Args:
         speed: (cmg,) [rad/s] that rotors have reached, if that is more than the scenario says.
     """
-    units: tuple[Any, ...] = scenario.cluster.placed()
-    nominal: list[float] = [float(unit.rotor.speed) if unit.rotor else 0.0 for unit in units]
-    fastest = np.abs(np.array(nominal))
-    if scenario.cluster.run_up is not None:
-        ends = scenario.cluster.run_up.speeds(tuple(nominal))
-        fastest = np.max(np.abs([fastest, *ends]), axis=0)
+    units: tuple[Any, ...] = scenario.units.placed()
+    fastest = scenario.units.fastest
     if speed is not None:
         fastest = np.maximum(fastest, speed)
     for j, unit in enumerate(units):
@@ -74,40 +71,40 @@ def refuse_coarse_tolerance(
     Args:
         tolerance: absolute, of one step.
     """
-    if satellite.disturbance is None:
+    orders = orders_of(satellite)
+    tables = [np.asarray(c.disturbance.coefficients(orders)) for c in satellite.clusters]
+    there = np.any(np.concatenate(tables) > 0.0, axis=-1)
+    there &= np.asarray(satellite.rotor_speed)[:, None] != 0.0
+    if not there.any():
         return
     size = steady_speeds(satellite, state).max(axis=-1)
-    there = np.any(np.asarray(satellite.disturbance.coefficient) > 0.0, axis=-1)
-    there &= np.asarray(satellite.cluster.rotor_speed)[:, None] != 0.0
     hidden = there & (size < tolerance)
     if not hidden.any():
         return
     j, k = (int(i) for i in np.unravel_index(np.argmin(np.where(hidden, size, np.inf)), size.shape))
     text = (
         f"expected at most {size[j, k]:.2g}, the amplitude of the bus's motion (rad/s or m/s) by "
-        f"order {scenario.cluster.orders[k]:g} of rotor {j}, the least of "
+        f"order {orders[k]:g} of rotor {j}, the least of "
         f"{int(hidden.sum())} that the tolerance hides; got {tolerance:g}. "
         "A harmonic run needs no such tolerance"
     )
     raise ScenarioError(scenario.name, [Problem(text, ("simulation", "tolerances", "absolute"))])
 
 
-def unseen(
-    scenario: Scenario, gimbal_rate: np.ndarray, rotor_speed: np.ndarray | None = None
-) -> str:
+def unseen(scenario: Scenario, gimbal_rate: np.ndarray, rotor_speed: np.ndarray) -> str:
     """Why the output rate could not show lines whose frequency only the run tells, or nothing.
 
     Args:
         gimbal_rate: (n, cmg) of the run [rad/s].
-        rotor_speed: (n, cmg) of the run [rad/s], if speeds change.
+        rotor_speed: (n, cmg) of the run [rad/s].
     """
     found: list[tuple[float, str]] = []
-    if rotor_speed is not None and rotor_speed.size:
+    if rotor_speed.size:
         found += _declared(scenario, np.max(np.abs(rotor_speed), axis=0))
-    motor = scenario.cluster.gimbal_motor
-    if motor is not None and gimbal_rate.size:
-        frequency = max(motor.lines) * float(np.max(np.abs(gimbal_rate))) / (2.0 * np.pi)
-        found.append((frequency, f"the gimbal motors' line {max(motor.lines)} in a turn"))
+    highest = max(scenario.units.ripple, default=0)
+    if highest and gimbal_rate.size:
+        frequency = highest * float(np.max(np.abs(gimbal_rate))) / (2.0 * np.pi)
+        found.append((frequency, f"the gimbal motors' line {highest} in a turn"))
     rate = scenario.simulation.output_rate
     frequency, what = max(found, default=(0.0, ""))
     if shows(rate, frequency):

@@ -46,7 +46,7 @@ class Verification:
         check_requirements(self.scenario, method_of(self.run), float(time[-1]))
         if method_of(self.run).jitter_apart:
             try:
-                rotors_of(self.run, self.scenario, self._judged_time)
+                rotors_of(self.run, self._judged_time)
             except ValueError as error:
                 problem = Problem(str(error), ("requirements",))
                 raise ScenarioError(self.scenario.name, [problem]) from None

@@ -11,7 +11,8 @@ import numpy as np
 
 from quietbus.reference.mjcf import write_mjcf
 from quietbus.reference.satellite import ReferenceSatellite
-from quietbus.scenario import Scenario
+from quietbus.scenario import Problem, Scenario, ScenarioError
+from quietbus.scenario.sites import BUS
 from quietbus.validate.flight import check_energy, check_flight, check_momentum, fly_both
 from quietbus.validate.harmonic import check_harmonic
 from quietbus.validate.instants import check_instants, check_start
@@ -45,6 +46,7 @@ def validate(
 
     Raises:
         ImportError: MuJoCo is not installed.
+        ScenarioError: a part that the program to compare with does not know.
     """
     return list(run_checks(scenario, random_states, duration, seed, progress, built_from))
 
@@ -58,6 +60,7 @@ def run_checks(
     built_from: Scenario | None = None,
 ) -> Iterator[Check]:
     """The checks of ``validate`` one by one, the quickest first."""
+    refuse_unknown(scenario)
     tell = progress or (lambda _: None)
     rng = np.random.default_rng(seed)
     subject = Subject(scenario, built_from or scenario)
@@ -91,20 +94,39 @@ def export_mjcf(scenario: Scenario) -> str:
     return write_mjcf(reference.mechanism, reference.initial())
 
 
+def refuse_unknown(scenario: Scenario) -> None:
+    """Raise ScenarioError for parts of which the program to compare with knows nothing."""
+    unknown = "the program that validate compares with knows none"
+    problems = []
+    for site in scenario.sites:
+        if site.on != BUS:
+            said = f"expected {BUS!r}, got {site.on!r}: a body on another platform; {unknown}"
+            problems.append(Problem(said, (*site.path, "on")))
+        strut = site.isolator.legs.strut
+        if strut and not strut.spring_and_damper():
+            said = f"expected spring_damper, got {strut.type!r}: a law of your own; {unknown}"
+            problems.append(Problem(said, (*site.path, "isolator", "legs", "strut", "type")))
+    for name, actuator in scenario.actuators.items():
+        said = f"expected none, got one of type {actuator.type!r}; {unknown}"
+        problems.append(Problem(said, ("actuators", name)))
+    if problems:
+        raise ScenarioError(scenario.name, problems)
+
+
 def not_covered(scenario: Scenario) -> list[str]:
     """What of a scenario ``validate`` does not check, one sentence each."""
-    said = []
-    rotors = [unit.rotor for unit in scenario.cluster.placed() if unit.rotor]
+    said, units = [], scenario.units
+    rotors = [unit.rotor for unit in units.placed() if unit.rotor]
     if any(rotor.disturbance and rotor.disturbance.broadband.given() for rotor in rotors):
         said.append("broadband disturbance of the rotors: both programs fly without it")
-    if scenario.cluster.gimbal_motor is not None:
+    if units.ripple:
         said.append("lines of the gimbal motors in harmonic runs; direct ones are checked")
-    if scenario.cluster.run_up is not None:
+    if units.run_up:
         said.append("harmonic runs while rotors change speed; `jitter` is checked at their own")
-    if scenario.isolator.mount == "rigid":
+    if any(site.isolator.mount == "rigid" for site in scenario.sites):
         said.append("joint forces of the legs, which a rigid mount leaves undetermined")
     if scenario.lines_of_sight or scenario.requirements:
         said.append("lines of sight and requirements: what is computed from the motion")
-    if scenario.isolator.legs.free_length is not None:
+    if any(site.isolator.legs.free_length is not None for site in scenario.sites):
         said.append("`jitter` at rest, if the struts' preload leaves no rest")
     return said

@@ -7,33 +7,35 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array
+from jaxtyping import Array, Float
 
-from quietbus.dynamics.closed_loop import rotor_angles
 from quietbus.dynamics.invariants import (
     angular_momentum_N,
+    energy,
     kinetic_energy,
     linear_momentum_N,
-    strut_energy,
 )
 from quietbus.dynamics.state import State
-from quietbus.model.satellite import Satellite
-from quietbus.model.variants import without_disturbance
+from quietbus.model.body import body_quantities
+from quietbus.model.disturbance import quiet_rotors
+from quietbus.model.satellite import BUS, Satellite
+from quietbus.model.variants import with_clusters, without_disturbance
 from quietbus.reference.motion import Motion
 from quietbus.solve.direct import Scheme, Solution, Tolerances, integrate
 from quietbus.validate.subject import Check, Subject, apart
 from quietbus.validate.trajectory import fly, lossless
-from quietbus.validate.translate import BUS, PLATE, state_of
+from quietbus.validate.translate import holding_legs, speeds_change, state_of
 
 TOLERANCES = Tolerances(1e-11, 1e-13)
 SAMPLES = 20  # beside the start
+MOTION = {"position": "p_NX_N", "velocity": "v_NX_N", "attitude": "q_NX", "rate": "w_NX_X"}
 
 
 @dataclass(frozen=True)
 class Flight:
     """Both programs' flights from one start; times from 0."""
 
-    start: State
+    start: Motion
     times: np.ndarray  # (n,) [s]
     theirs: list[Motion]
     ours: Solution
@@ -47,61 +49,57 @@ def ended(solution: Solution, count: int) -> str:
 
 def fly_both(subject: Subject, start: Motion, duration: float) -> Flight:
     """Fly the scenario, as it is, from a start."""
-    state = state_of(subject.satellite, start)
-    ours = _direct(subject.satellite, state, duration)
+    ours = _direct(subject.satellite, state_of(subject.satellite, start), duration)
     times = np.arange(SAMPLES + 1) * (duration / SAMPLES)
-    return Flight(state, times, subject.reference.fly(start, times), ours)
+    return Flight(start, times, subject.reference.fly(start, times), ours)
 
 
 def _direct(satellite: Satellite, state: State, duration: float) -> Solution:
     # in pieces, as longer runs are
-    piece = duration / 2.5
-    scheme = Scheme(piece=piece, states=True, joint_forces=satellite.mount == "isolated")
+    scheme = Scheme(piece=duration / 2.5, states=True, joint_forces=True)
     return integrate(satellite, state, duration, SAMPLES / duration, TOLERANCES, scheme)
 
 
 def check_flight(subject: Subject, flight: Flight) -> Check:
     """Everything that a run of the direct solver reports."""
-    reference = subject.reference
+    reference, satellite = subject.reference, subject.satellite
     at = [reference.at(t, m) for t, m in zip(flight.times, flight.theirs, strict=True)]
     moved = {name: np.array([vars(m)[name] for m in flight.theirs]) for name in vars(at[0].rates)}
     theirs = {
-        "bus_position": moved["p_NX_N"][:, BUS],
-        "bus_velocity": moved["v_NX_N"][:, BUS],
-        "bus_attitude": moved["q_NX"][:, BUS],
-        "bus_rate": moved["w_NX_X"][:, BUS],
-        "platform_position": moved["p_NX_N"][:, PLATE] - moved["p_NX_N"][:, BUS],
-        "platform_velocity": moved["v_NX_N"][:, PLATE],
-        "platform_attitude": moved["q_NX"][:, PLATE],
-        "platform_rate": moved["w_NX_X"][:, PLATE],
         "gimbal_angle": moved["gimbal_angle"],
         "gimbal_rate": moved["gimbal_rate"],
-        "leg_stroke": np.array([i.stroke for i in at]),
-        "leg_force": np.array([i.strut_force for i in at]),
+        "rotor_angle": moved["rotor_angle"],
+        "rotor_speed": moved["rotor_speed"],
         "control_torque": np.array([i.decisions.torque for i in at]),
         "attitude_error": np.array([i.decisions.attitude_error for i in at]),
         "singularity_measure": np.array([[i.decisions.singularity] for i in at]),
     }
-    if subject.satellite.mount == "rigid":  # the struts do not move
-        del theirs["leg_stroke"], theirs["leg_force"]
+    legs = holding_legs(satellite)
+    if np.any(legs):  # others' struts do not move
+        theirs["leg_stroke"] = np.array([i.stroke[legs] for i in at])
+        theirs["leg_force"] = np.array([i.strut_force[legs] for i in at])
+    if speeds_change(satellite):
+        theirs["rotor_torque"] = np.array([i.rotor_torque for i in at])
+    if at[0].joints is not None:
+        for name in ("spherical_force", "universal_force"):
+            theirs[name] = np.array([vars(i.joints)[name] for i in at])
+    quantities = {body.name: body_quantities(body.name) for body in satellite.bodies}
+    for number, each in enumerate(quantities.values()):
+        theirs |= {each[kind].name: moved[field][:, number] for kind, field in MOTION.items()}
     error, early = np.nan, ended(flight.ours, len(flight.times))
     if not early:
-        found = flight.ours.outputs
-        ours = {name: np.asarray(getattr(found, name)) for name in theirs}
-        ours["platform_position"] = ours["platform_position"] - ours["bus_position"]
+        ours = {name: np.asarray(flight.ours.outputs[name]) for name in theirs}
         ours["singularity_measure"] = ours["singularity_measure"][:, None]
-        for name in ("bus_attitude", "platform_attitude"):
-            same = np.sign(np.sum(ours[name] * theirs[name], axis=1, keepdims=True))
-            ours[name] = same * ours[name]
-        if found.rotor_speed is not None:
-            names = ("rotor_angle", "rotor_speed", "rotor_torque")
-            theirs |= {name: moved[name] for name in names[:2]}
-            theirs["rotor_torque"] = np.array([i.rotor_torque for i in at])
-            ours |= {name: np.asarray(getattr(found, name)) for name in names}
-        if found.joint_forces is not None:
-            for name in ("spherical_force", "universal_force"):
-                theirs[name] = np.array([vars(i.joints)[name] for i in at])
-                ours[name] = np.asarray(getattr(found.joint_forces, name))
+        for name in ("leg_stroke", "leg_force"):
+            if name in ours:
+                ours[name] = ours[name][:, legs]
+        for name, each in quantities.items():
+            attitude, place = each["attitude"].name, each["position"].name
+            same = np.sign(np.sum(ours[attitude] * theirs[attitude], axis=1, keepdims=True))
+            ours[attitude] = same * ours[attitude]
+            if name != BUS:
+                for found in (theirs, ours):
+                    found[place] = found[place] - found[quantities[BUS]["position"].name]
         error = apart(theirs, ours, 1e-9)
     said = f"; ended: {early}" if early else ""
     return Check(
@@ -117,9 +115,11 @@ def check_flight(subject: Subject, flight: Flight) -> Check:
 def check_momentum(subject: Subject, flight: Flight) -> list[Check]:
     """Linear and angular momentum of a flight under control, without loads."""
     satellite, ours = subject.satellite, flight.ours
-    free = replace(without_disturbance(satellite), loads=(), motor=satellite.motor)
-    if satellite.loads or satellite.disturbance is not None:
-        ours = _direct(free, flight.start, float(flight.times[-1]))
+    free = with_clusters(satellite, lambda c: replace(c, disturbance=quiet_rotors(c.count)))
+    free = replace(free, others=tuple(e for e in satellite.others if not e.external))
+    changed = jax.tree.structure(free) != jax.tree.structure(satellite)  # type: ignore[operator]
+    if changed:
+        ours = _direct(free, state_of(free, flight.start), float(flight.times[-1]))
 
     def both(*arguments):
         return jnp.stack([linear_momentum_N(*arguments), angular_momentum_N(*arguments)])
@@ -140,23 +140,21 @@ def check_momentum(subject: Subject, flight: Flight) -> list[Check]:
 def check_energy(subject: Subject, flight: Flight) -> Check:
     """Energy of a flight without damping, friction, rotor and gimbal motion."""
     start = flight.start
-    locked, at_rest = (
-        lossless(without_disturbance(subject.satellite)),
-        replace(start, gimbal_rate=jnp.zeros_like(start.gimbal_rate), rotor=None),
-    )
-    states = fly(locked, at_rest, jnp.asarray(flight.times))
-    energy = over_time(_energy, locked, flight.times, states)
+    locked = lossless(without_disturbance(subject.satellite))
+    still = replace(start, gimbal_rate=0.0 * start.gimbal_rate)
+    states = fly(locked, state_of(locked, still), jnp.asarray(flight.times))
+    found = over_time(_energy, locked, flight.times, states)
     return Check(
         "energy",
         "damping and friction off, CMGs locked: sum over all bodies and springs in "
         f"{flight.times[-1]:.2g} s, no loads",
-        float(np.max(np.abs(energy - energy[0])) / energy[0]),
+        float(np.max(np.abs(found - found[0])) / found[0]),
         1e-9,
     )
 
 
-def _energy(satellite: Satellite, phi: Array, state: State) -> Array:
-    return kinetic_energy(satellite, phi, state) + strut_energy(satellite, state)
+def _energy(satellite: Satellite, t: Float[Array, ""], state: State) -> Array:
+    return kinetic_energy(satellite, t, state) + energy(satellite, t, state).stored
 
 
 def over_time(
@@ -165,13 +163,10 @@ def over_time(
     times: np.ndarray,
     states: State,
 ) -> np.ndarray:
-    """A function of satellite, rotor angles and state at every time of a flight."""
+    """A function of satellite, time and state at every time of a flight."""
     return np.asarray(_over_time(quantity, satellite, jnp.asarray(times), states))
 
 
 @eqx.filter_jit
 def _over_time(quantity, satellite, times, states):
-    def at(t, state):
-        return quantity(satellite, rotor_angles(satellite, t, state), state)
-
-    return jax.vmap(at)(times, states)
+    return jax.vmap(lambda t, state: quantity(satellite, t, state))(times, states)

@@ -4,26 +4,27 @@ from dataclasses import replace
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 
 from quietbus.analysis.jitter.lines import AT_REST, rest_error, steady_jitter
+from quietbus.dynamics.rotor_response import orders_of
 from quietbus.dynamics.state import State
 from quietbus.dynamics.vibration import Vibration
-from quietbus.model.disturbance import orders_of
-from quietbus.model.satellite import Satellite
+from quietbus.model.body import body_quantities
+from quietbus.model.gimbal_motor import SmoothMotor
+from quietbus.model.rotors import RunUp
+from quietbus.model.satellite import BUS, Satellite
 from quietbus.reference.platforms import blocks
 from quietbus.reference.units import unit_data
 from quietbus.solve.direct import SLOW, Tolerances
-from quietbus.solve.harmonic import (
-    HarmonicSolution,
-    ResonanceError,
-    integrate_harmonic,
-    on_periodic_solution,
-)
+from quietbus.solve.harmonic import HarmonicSolution, integrate_harmonic
+from quietbus.solve.periodic import on_periodic_solution
+from quietbus.solve.validity import ResonanceError
 from quietbus.validate.flight import SAMPLES, Flight, ended
 from quietbus.validate.subject import Check, Subject, apart
-from quietbus.validate.translate import BUS, PLATE, motion_of, state_of
+from quietbus.validate.translate import motion_of, state_of
 
 SMALL = 1e-9  # [rad] turn of the bus by all lines: what is of second order does not count
 TURNS = 8  # of the slowest rotor
@@ -42,8 +43,12 @@ def check_harmonic(subject: Subject, flight: Flight) -> list[Check]:
     try:
         checks = _at_rest(small, piece, subject.scenario.initial.steady)
         # ripple is no line of a rotor, and lines of rotors that run up begin with nothing
-        if subject.satellite.motor is None and subject.satellite.cluster.run_up is None:
-            run = _run(subject.satellite, flight.start, piece, piece)
+        if all(
+            isinstance(cluster.motor, SmoothMotor) and not isinstance(cluster.rotors, RunUp)
+            for cluster in subject.satellite.clusters
+        ):
+            start = state_of(subject.satellite, flight.start)
+            run = _run(subject.satellite, start, piece, piece)
             checks.insert(0, _in_motion(subject, flight, run))
     except ResonanceError:
         return []
@@ -53,11 +58,11 @@ def check_harmonic(subject: Subject, flight: Flight) -> list[Check]:
 def _in_motion(subject: Subject, flight: Flight, run: HarmonicSolution) -> Check:
     error = np.nan
     if not ended(run.slow, len(flight.times)):
-        states = run.slow.states
-        amplitude = run.jitter.amplitudes["bus_rate"]
-        lines = _in_time(subject.satellite, flight.times, states, amplitude)
-        theirs = np.array([motion.w_NX_X[BUS] for motion in flight.theirs])
-        off = np.asarray(run.slow.outputs.bus_rate) + lines - theirs
+        name = body_quantities(BUS)["rate"].name
+        amplitude = run.jitter.amplitudes[name]
+        lines = _in_time(subject.satellite, flight.times, run.slow.states, amplitude)
+        theirs = np.array([motion.w_NX_X[0] for motion in flight.theirs])
+        off = np.asarray(run.slow.outputs[name]) + lines - theirs
         error = float(np.max(np.linalg.norm(off, axis=1)) / _size(amplitude))
     return Check(
         "harmonic run",
@@ -86,11 +91,13 @@ def _at_rest(subject: Subject, piece: float, steady: bool) -> list[Check]:
     start = reference.initial()
     run = _run(satellite, state_of(satellite, start), times[-1], piece, steady)
     if steady:
-        start = motion_of(satellite, on_periodic_solution(satellite, state_of(satellite, start)))
+        start = motion_of(
+            satellite, 0.0, on_periodic_solution(satellite, state_of(satellite, start))
+        )
     motions = reference.fly(start, times, 1e-10, 1e-16)
     theirs = {
-        "bus_rate": np.array([motion.w_NX_X[BUS] for motion in motions]),
-        "platform_rate": np.array([motion.w_NX_X[PLATE] for motion in motions]),
+        body_quantities(body.name)["rate"].name: np.array([m.w_NX_X[number] for m in motions])
+        for number, body in enumerate(satellite.bodies)
     }
     error = np.nan
     if not ended(run.slow, len(times)):
@@ -98,13 +105,13 @@ def _at_rest(subject: Subject, piece: float, steady: bool) -> list[Check]:
         for name in theirs:
             constant = np.broadcast_to(amplitudes[name], (len(times), *amplitudes[name].shape))
             lines = _in_time(satellite, times, run.slow.states, constant)
-            ours[name] = np.asarray(getattr(run.slow.outputs, name)) + lines
+            ours[name] = np.asarray(run.slow.outputs[name]) + lines
         error = apart(theirs, ours)
     return [
         Check(
             "lines from rest",
             f"lines of `jitter`{'' if steady else ' and the transient that they cause'}, against "
-            f"{TURNS} turns flown with MuJoCo, control on: bus and plate rate, imbalance scaled "
+            f"{TURNS} turns flown with MuJoCo, control on: rates of all bodies, imbalance scaled "
             "until it counts to first order only",
             error,
             1e-4,
@@ -132,12 +139,17 @@ def _in_time(
 ) -> np.ndarray:
     """Sum of all lines (n, axis) for amplitudes (n, cmg, order, axis)."""
     assert states is not None
-    cluster = satellite.cluster
-    phi = np.asarray(cluster.rotor_phase) + np.outer(times, np.asarray(cluster.rotor_speed))
-    if states.rotor is not None:
-        phi = np.asarray(states.rotor.angle)
-    turned = np.exp(1j * phi[:, :, None] * np.asarray(orders_of(satellite.disturbance)))
+    phi = np.asarray(_rotor_angles(satellite, jnp.asarray(times), states))
+    turned = np.exp(1j * phi[:, :, None] * np.asarray(orders_of(satellite)))
     return np.sum((amplitude * turned[..., None]).real, axis=(1, 2))
+
+
+@eqx.filter_jit
+def _rotor_angles(satellite, times, states):
+    def at(t, state):
+        return jnp.concatenate([c.at(t, state.own).rotor.angle for c in satellite.clusters])
+
+    return jax.vmap(at)(times, states)
 
 
 def _size(amplitude: np.ndarray) -> float:

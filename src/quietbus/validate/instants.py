@@ -6,20 +6,28 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 
-from quietbus.dynamics.closed_loop import control_signals, evaluate, state_rate
+from quietbus.dynamics.closed_loop import evaluate, state_rate
 from quietbus.dynamics.outputs import outputs
-from quietbus.model.satellite import Satellite
+from quietbus.dynamics.rotor_response import orders_of
+from quietbus.model.satellite import CONTROL, Satellite
 from quietbus.reference.motion import Motion
 from quietbus.reference.satellite import Instant
 from quietbus.validate.motions import random_motion, random_times
 from quietbus.validate.subject import Check, Subject, apart
-from quietbus.validate.translate import motion_of, state_of
+from quietbus.validate.translate import (
+    driven_by,
+    holding_legs,
+    motion_of,
+    speeds_change,
+    state_of,
+)
 
 
 def check_start(subject: Subject) -> Check:
     """The state at t = 0."""
-    theirs, ours = subject.reference.initial(), motion_of(subject.satellite, subject.state)
+    theirs, ours = subject.reference.initial(), motion_of(subject.satellite, 0.0, subject.state)
     return Check(
         "start",
         "both programs' state at t = 0, each from the scenario by itself",
@@ -55,7 +63,7 @@ def check_instants(subject: Subject, count: int, rng: np.random.Generator) -> li
         Check(
             "control",
             "controller, steering, servos and motors at these states, by a second program",
-            _each(_decisions(theirs), ours[1], 1e-12),
+            _each(_decisions(theirs, satellite), ours[1], 1e-12),
             1e-9,
         ),
     ]
@@ -69,7 +77,7 @@ def check_instants(subject: Subject, count: int, rng: np.random.Generator) -> li
                 1e-9,
             )
         )
-    if satellite.mount == "isolated":
+    if theirs[0].joints is not None:
         checks.append(
             Check(
                 "joint forces",
@@ -83,42 +91,49 @@ def check_instants(subject: Subject, count: int, rng: np.random.Generator) -> li
 
 def _rounding(subject: Subject) -> float:
     """What rounding of the rotors' angles may do: they are large at the end of a long run."""
-    if subject.satellite.cluster.drive is not None:
-        return 0.0
-    speed = np.max(np.abs(subject.reference.mechanism.units.speed))
-    fastest = max(subject.scenario.cluster.orders) * speed
-    return 4e-15 * float(fastest) * subject.scenario.simulation.duration
+    reference = subject.reference
+    turn = np.abs(reference.control.prescribed(subject.scenario.simulation.duration)[0])
+    prescribed = ~reference.mechanism.units.wheel | reference.control.runs_up
+    fastest = max(orders_of(subject.satellite)) * np.max(turn[prescribed], initial=0.0)
+    return 4e-15 * float(fastest)
 
 
 @eqx.filter_jit
 def _evaluated(satellite, times, states):
     """Accelerations, decisions, what is reported, joint forces: by name, (n, ...)."""
+    legs = holding_legs(satellite)
 
     def at(t, state):
-        _, a = evaluate(satellite, t, state)
-        signals, rate = control_signals(satellite, t, state), state_rate(satellite, t, state)
-        found = outputs(satellite, t, state, with_joint_forces=satellite.mount == "isolated")
-        accelerations = {"v of bus": a.v_B, "w of bus": a.w_B}
-        accelerations |= {"v of plate": a.v_P, "w of plate": a.w_P}
+        found = evaluate(satellite, t, state)
+        rate, told = state_rate(satellite, t, state), outputs(satellite, t, state, detailed=True)
+        accelerations: dict[str, Array] = {}
+        for body in satellite.bodies:
+            rows = found.u_rate[found.now.layout.rows(body.name)]
+            accelerations |= {f"v of {body.name}": rows[:3], f"w of {body.name}": rows[3:]}
+        gimbals, rotors = driven_by(satellite, t, state, found.rates)
+        memory_rate = rate.own[CONTROL].z
         decisions = {
-            "attitude_error": signals.attitude_error_B,
-            "torque": signals.torque_B,
-            "integral_rate": rate.error_integral,
-            "gimbal_acceleration": rate.gimbal_rate,
-            "rotor_acceleration": 0.0 * rate.gimbal_rate
-            if rate.rotor is None
-            else rate.rotor.speed,
-            "singularity": found.singularity_measure,
-            "torque_share": jnp.ones(()) if signals.torque_share is None else signals.torque_share,
-            "q_NX": jnp.stack([rate.q_NB, rate.q_NP]),
+            "attitude_error": found.decision.error_B,
+            "torque": found.decision.torque_B,
+            "integral_rate": memory_rate if len(memory_rate) else jnp.zeros(3),
+            "gimbal_acceleration": gimbals,
+            "rotor_acceleration": rotors,
+            "singularity": told["singularity_measure"],
+            "torque_share": found.decision.torque_share,
         }
-        reported = {"stroke": found.leg_stroke, "strut_force": found.leg_force}
-        if found.rotor_torque is not None:
-            reported["rotor_torque"] = found.rotor_torque
-        joints = {} if found.joint_forces is None else vars(found.joint_forces)
-        return accelerations, decisions, reported, joints
+        decisions |= {f"q of {name}": body.q_NX for name, body in rate.bodies.items()}
+        reported = {}
+        if np.any(legs):
+            reported["stroke"] = told["leg_stroke"][legs]
+            reported["strut_force"] = told["leg_force"][legs]
+        if speeds_change(satellite):
+            reported["rotor_torque"] = told["rotor_torque"]
+        return accelerations, decisions, reported, {n: told[n] for n in JOINTS if n in told}
 
     return jax.vmap(at)(times, states)
+
+
+JOINTS = ("spherical_force", "universal_force", "universal_moment", "universal_axis")
 
 
 def _each(theirs: Sequence[dict], ours: dict, least: float = 1e-300) -> float:
@@ -138,25 +153,27 @@ def _accelerations(theirs: Sequence[Instant], names: Sequence[str]) -> list[dict
     ]
 
 
-def _decisions(theirs: Sequence[Instant]) -> list[dict]:
+def _decisions(theirs: Sequence[Instant], satellite: Satellite) -> list[dict]:
     names = ["attitude_error", "torque", "integral_rate", "rotor_acceleration"]
     names += ["singularity", "torque_share"]
+    free = {body.name: i for i, body in enumerate(satellite.bodies) if body.name in satellite.free}
     return [
         {name: getattr(at.decisions, name) for name in names}
-        | {
-            "gimbal_acceleration": at.rates.gimbal_rate,
-            "q_NX": at.rates.q_NX,
-        }
+        | {"gimbal_acceleration": at.rates.gimbal_rate}
+        | {f"q of {name}": at.rates.q_NX[number] for name, number in free.items()}
         for at in theirs
     ]
 
 
 def _reported(theirs: Sequence[Instant], satellite: Satellite) -> list[dict]:
-    """On a rigid mount the struts do not move."""
-    names = ["rotor_torque"] if satellite.cluster.drive is not None else []
-    if satellite.mount == "isolated":
-        names += ["stroke", "strut_force"]
-    return [{name: getattr(at, name) for name in names} for at in theirs]
+    """Of struts that move, and of motors where rotors change their speeds."""
+    legs, found = holding_legs(satellite), []
+    for at in theirs:
+        told = {"rotor_torque": at.rotor_torque} if speeds_change(satellite) else {}
+        if np.any(legs):
+            told |= {"stroke": at.stroke[legs], "strut_force": at.strut_force[legs]}
+        found.append(told)
+    return found
 
 
 def _joints(theirs: Sequence[Instant]) -> list[dict]:

@@ -1,7 +1,5 @@
 """A satellite without a scenario as a MuJoCo model."""
 
-import numpy as np
-
 from quietbus.dynamics.state import State
 from quietbus.model.satellite import Satellite
 from quietbus.reference import mjcf
@@ -13,7 +11,7 @@ def write_mjcf(
     state: State,
     legs: mjcf.LegModel = "tendons",
     timestep: float = 1e-4,
-    rotor_angle: np.ndarray | None = None,
+    t: float = 0.0,
 ) -> str:
     """MuJoCo XML of the satellite as of ``quietbus.reference.mjcf``.
 
@@ -21,7 +19,7 @@ def write_mjcf(
         state: motion at the keyframe.
         legs: massless springs and dampers, or bodies.
         timestep: [s] of MuJoCo's integrator.
-        rotor_angle: (cmg,) rotor angles at the keyframe [rad]; those at the start by default.
+        t: [s] of the keyframe, which turns rotors of prescribed speed.
     """
-    motion = motion_of(satellite, state, rotor_angle)
+    motion = motion_of(satellite, t, state)
     return mjcf.write_mjcf(mechanism_of(satellite), motion, legs, timestep)

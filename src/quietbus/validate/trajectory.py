@@ -3,6 +3,8 @@
 Both programs fly a satellite whose gimbals keep their rates, under a constant load. Legs are
 massless struts, which MuJoCo knows as tendons: no constraint has to be closed, so its own
 integrator applies.
+
+Loads are (body, 2, 3) forces [N] and torques [N m] about the bodies' origins, inertial.
 """
 
 from dataclasses import replace
@@ -16,19 +18,29 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float
 from scipy.linalg import block_diag, eigh
 
-from quietbus.dynamics.closed_loop import rotor_angles, state_rate
-from quietbus.dynamics.equations import Wrench
+from quietbus.dynamics.closed_loop import state_rate
 from quietbus.dynamics.state import State
-from quietbus.model.cmg import ClusterMoments
+from quietbus.model.cluster import Cluster
+from quietbus.model.controller import NoController
+from quietbus.model.element import Rates
+from quietbus.model.gimbals import GimbalServos
 from quietbus.model.load import Constant, Load
-from quietbus.model.satellite import Satellite
-from quietbus.model.variants import without_friction, without_leg_mass, without_rotation
+from quietbus.model.satellite import BUS, Satellite
+from quietbus.model.steering import NoSteering
+from quietbus.model.variants import (
+    with_clusters,
+    without_friction,
+    without_leg_mass,
+    without_rotation,
+)
 from quietbus.reference.engine import import_mujoco
+from quietbus.reference.mechanism import Mechanism
 from quietbus.reference.mjcf import ARMATURE
+from quietbus.reference.motion import Motion
 from quietbus.solve.integrator import diffeqsolve
 from quietbus.spatial.inertia import point_inertia
 from quietbus.validate.mjcf import write_mjcf
-from quietbus.validate.translate import mechanism_of
+from quietbus.validate.translate import driven_by, mechanism_of, state_of
 
 
 def massless_legs(satellite: Satellite) -> Satellite:
@@ -36,30 +48,51 @@ def massless_legs(satellite: Satellite) -> Satellite:
     return without_friction(without_leg_mass(satellite))
 
 
-def held_gimbals(satellite: Satellite, wrench: Wrench) -> Satellite:
-    """The satellite without control, gimbals keeping their rates, under a constant load."""
-    zero = jnp.zeros(3)
-    loads = (
-        Load("plate", "inertial", wrench.force_P, wrench.torque_P, zero, Constant()),
-        Load("bus", "inertial", wrench.force_B, wrench.torque_B, zero, Constant()),
-    )
-    servo = replace(satellite.servo, bandwidth=jnp.zeros(()))
-    return replace(satellite, controller=None, steering=None, loads=loads, servo=servo)
+def no_loads(satellite: Satellite) -> np.ndarray:
+    """Nothing on any body."""
+    return np.zeros((len(satellite.bodies), 2, 3))
+
+
+def load_on(satellite: Satellite, name: str, force: object, torque: object = 0.0) -> np.ndarray:
+    """One force [N] and torque [N m] on a body."""
+    wrenches = no_loads(satellite)
+    number = [body.name for body in satellite.bodies].index(name)
+    wrenches[number, 0], wrenches[number, 1] = force, torque
+    return wrenches
+
+
+def held_gimbals(satellite: Satellite, wrenches: np.ndarray | None = None) -> Satellite:
+    """The satellite without control, gimbals keeping their rates, under constant loads, or none."""
+    parts = [element for element in satellite.others if not element.external]
+    if wrenches is not None:
+        parts += [
+            Load(
+                f"load on {body.name}",
+                (body.name,),
+                "inertial",
+                jnp.asarray(force),
+                jnp.asarray(torque),
+                jnp.zeros(3),
+                Constant(),
+            )
+            for body, (force, torque) in zip(satellite.bodies, wrenches, strict=True)
+        ]
+    control = replace(satellite.control, controller=NoController(), steering=NoSteering())
+    return replace(with_clusters(satellite, _held), others=tuple(parts), control=control)
+
+
+def _held(cluster: Cluster) -> Cluster:
+    if not isinstance(cluster.gimbals, GimbalServos):
+        return cluster
+    idle = jnp.zeros_like(cluster.gimbals.bandwidth)
+    return replace(cluster, gimbals=replace(cluster.gimbals, bandwidth=idle))
 
 
 def lossless(satellite: Satellite) -> Satellite:
     """The satellite without damping, friction, loads and control, its rotors stopped."""
-    undamped = replace(satellite.legs, damping=jnp.zeros_like(satellite.legs.damping))
-    still = without_rotation(without_friction(replace(satellite, legs=undamped)))
-    return held_gimbals(still, Wrench.zero())
-
-
-def at_constant_speed(satellite: Satellite, state: State) -> tuple[Satellite, State]:
-    """Satellite and state with rotors that keep the speeds which they have in the state."""
-    if state.rotor is None:
-        return satellite, state
-    cluster = replace(satellite.cluster, rotor_speed=state.rotor.speed)
-    return replace(satellite, cluster=cluster), replace(state, rotor=None)
+    damping = lambda s: [legs.strut.damping for legs in s.hexapods]  # noqa: E731
+    undamped = eqx.tree_at(damping, satellite, replace_fn=jnp.zeros_like)
+    return held_gimbals(without_rotation(without_friction(undamped)))
 
 
 @eqx.filter_jit
@@ -71,12 +104,12 @@ def fly(
     The first time is that of ``state``. ``tolerance`` is relative, per step. A flight that cannot
     go on ends in numbers that are not finite.
     """
-    moments = ClusterMoments.expand(satellite.cluster)
+    satellite = satellite.prepared()
     start, unravel = ravel_pytree(state)
 
     @jax.jit  # traced once for the integrator's many uses of it
     def rate(t, y, _):
-        return ravel_pytree(state_rate(satellite, t, unravel(y), None, moments))[0]
+        return ravel_pytree(state_rate(satellite, t, unravel(y)))[0]
 
     steps = diffrax.PIDController(rtol=tolerance, atol=0.1 * tolerance)
     flight = diffeqsolve(
@@ -100,7 +133,7 @@ def fly_mujoco_to(
     bound: float,
     satellite: Satellite,
     state: State,
-    wrench: Wrench,
+    wrenches: np.ndarray,
     times: np.ndarray,
     max_steps: int = 500_000,
 ) -> tuple[State, float]:
@@ -111,10 +144,10 @@ def fly_mujoco_to(
     """
     duration = times[-1] - times[0]
     timestep = min(0.1 / fastest_rate(satellite), duration / 200)
-    coarse = fly_mujoco(satellite, state, wrench, times, timestep)
+    coarse = fly_mujoco(satellite, state, wrenches, times, timestep)
     while True:
         timestep /= 2.0
-        fine = fly_mujoco(satellite, state, wrench, times, timestep)
+        fine = fly_mujoco(satellite, state, wrenches, times, timestep)
         best = jax.tree.map(lambda c, f: f + (f - c) / 15.0, coarse, fine)
         own_error = largest_difference(best, fine)
         if own_error < bound or 2.0 * duration / timestep > max_steps:
@@ -123,60 +156,61 @@ def fly_mujoco_to(
 
 
 def fly_mujoco(
-    satellite: Satellite, state: State, wrench: Wrench, times: np.ndarray, timestep: float
+    satellite: Satellite, state: State, wrenches: np.ndarray, times: np.ndarray, timestep: float
 ) -> State:
     """States at the given times [s] by MuJoCo's fourth-order Runge-Kutta method.
 
     Args:
         satellite: legs have to be massless and joints without friction; a run-up has to be linear
             and to last for all of the flight.
-        wrench: constant load.
+        wrenches: constant loads.
         times: equally spaced.
         timestep: upper bound [s]; the spacing of the times is divided evenly.
     """
     mujoco = import_mujoco()
     steps = int(np.ceil((times[1] - times[0]) / timestep - 1e-9))
-    phi = np.asarray(rotor_angles(satellite, times[0], state))
-    xml = write_mjcf(satellite, state, "tendons", (times[1] - times[0]) / steps, phi)
+    xml = write_mjcf(satellite, state, "tendons", (times[1] - times[0]) / steps, times[0])
     model = mujoco.MjModel.from_xml_string(xml)
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, model.key("start").id)
-    for body, force, torque in (
-        ("plate_origin", wrench.force_P, wrench.torque_P),
-        ("bus", wrench.force_B, wrench.torque_B),
-    ):
-        data.xfrc_applied[data.body(body).id] = np.concatenate([force, torque])
-    if satellite.cluster.run_up is not None and state.rotor is not None:
-        acceleration = np.asarray(satellite.cluster.run_up.acceleration(jnp.asarray(times[0])))
-        for j, spin_up in enumerate(acceleration):
-            data.qfrc_applied[model.joint(f"rotor{j}").dofadr[0]] = ARMATURE * spin_up
-    states = [_read(mujoco, model, data, satellite)]
+    mechanism = mechanism_of(satellite)
+    for name, wrench in zip(mechanism.names, wrenches, strict=True):
+        data.xfrc_applied[data.body(f"{name}_origin").id] = wrench.ravel()
+    _, spin_up = driven_by(satellite, jnp.asarray(times[0], float), state, _idle(satellite))
+    for j, acceleration in enumerate(np.asarray(spin_up)):
+        data.qfrc_applied[model.joint(f"rotor{j}").dofadr[0]] = ARMATURE * acceleration
+    states = [state_of(satellite, _read(mujoco, model, data, mechanism))]
     for _ in times[1:]:
         mujoco.mj_step(model, data, steps)
-        states.append(_read(mujoco, model, data, satellite))
+        states.append(state_of(satellite, _read(mujoco, model, data, mechanism)))
     return jax.tree.map(lambda *leaves: np.stack(leaves), *states)
+
+
+def _idle(satellite: Satellite) -> dict[str, Rates]:
+    """Drives that do nothing."""
+    return {c.name: Rates(jnp.zeros(c.driven), jnp.zeros(0)) for c in satellite.clusters}
 
 
 def differences(a: State, b: State) -> dict[str, float]:
     """Largest difference of two flights, relative to the largest value that flight a has.
 
-    Per quantity of bus and plate: position, attitude [rad, absolute], velocity, rate. Positions of
-    the plate are compared relative to the bus.
+    Per quantity of each free body: position, attitude [rad, absolute], velocity, rate. Positions
+    of all but the bus are compared relative to it.
     """
-    a_plate, b_plate = a.p_NP_N - a.p_NB_N, b.p_NP_N - b.p_NB_N
-    pairs = {
-        "bus position": (a.p_NB_N, b.p_NB_N),
-        "plate position": (a_plate, b_plate),
-        "bus velocity": (a.v_NB_N, b.v_NB_N),
-        "plate velocity": (a.v_NP_N, b.v_NP_N),
-        "bus rate": (a.w_NB_B, b.w_NB_B),
-        "plate rate": (a.w_NP_P, b.w_NP_P),
-    }
-    least = float(np.finfo(float).tiny)
-    found = {name: _largest(x - y) / max(_largest(x), least) for name, (x, y) in pairs.items()}
-    for name, x, y in (("bus attitude", a.q_NB, b.q_NB), ("plate attitude", a.q_NP, b.q_NP)):
-        sign = jnp.sign(jnp.sum(x * y, axis=1, keepdims=True))
-        found[name] = 2.0 * _largest(x - sign * y)
+    least, found = float(np.finfo(float).tiny), {}
+    for name, x in a.bodies.items():
+        y = b.bodies[name]
+        place_x, place_y = x.p_NX_N, y.p_NX_N
+        if name != BUS:
+            place_x, place_y = place_x - a.bus.p_NX_N, place_y - b.bus.p_NX_N
+        for quantity, one, other in (
+            ("position", place_x, place_y),
+            ("velocity", x.v_NX_N, y.v_NX_N),
+            ("rate", x.w_NX_X, y.w_NX_X),
+        ):
+            found[f"{name} {quantity}"] = _largest(one - other) / max(_largest(one), least)
+        sign = jnp.sign(jnp.sum(x.q_NX * y.q_NX, axis=1, keepdims=True))
+        found[f"{name} attitude"] = 2.0 * _largest(x.q_NX - sign * y.q_NX)
     return found
 
 
@@ -188,59 +222,64 @@ def largest_difference(a: State, b: State) -> float:
 def fastest_rate(satellite: Satellite) -> float:
     """Largest of rotor speeds, natural frequencies and damping rates, roughly [rad/s].
 
-    Each of the two plates on the struts alone; only to choose a step.
+    Each of the two bodies that struts join on these alone; only to choose a step.
     """
-    legs, cluster = satellite.legs, satellite.cluster
-    unit = np.asarray(cluster.gimbal_mass + cluster.rotor_mass)
-    inertia_P = np.asarray(satellite.plate.I_PPcm_P)  # with the units as points
-    inertia_P = inertia_P + sum(map(point_inertia, unit, np.asarray(cluster.p_PC_P)))
-    spans = mechanism_of(satellite).spans_Y
-    s = spans / np.linalg.norm(spans, axis=1, keepdims=True)
-    fastest = float(np.max(np.abs(cluster.rotor_speed)))
-    if satellite.mount == "rigid":
-        return max(fastest, 1.0)
-    for mass, inertia, arms in (
-        (satellite.plate.mass + unit.sum(), inertia_P, legs.p_PU_P),
-        (satellite.bus.mass, satellite.bus.I_BBcm_B, legs.p_BA_B),
-    ):
-        rows = np.concatenate([s, np.cross(arms, s)], axis=1)
-        M = block_diag(mass * np.eye(3), inertia)
-        stiff = eigh(rows.T @ (np.asarray(legs.stiffness)[:, None] * rows), M)[0]
-        damped = eigh(rows.T @ (np.asarray(legs.damping)[:, None] * rows), M)[0]
-        fastest = max(fastest, float(np.sqrt(np.max(stiff))), float(np.max(damped)))
+    fastest = max(float(np.max(np.abs(satellite.rotor_speed), initial=0.0)), 1.0)
+    nominal = satellite.nominal()
+    for legs in satellite.hexapods:
+        if not legs.holds:
+            continue
+        joints = (legs.geometry.p_PU_P, legs.geometry.p_BA_B)
+        hosts = [nominal[host] for host in legs.hosts]
+        arms = [np.asarray(p @ m.R_AX.T) for p, m in zip(joints, hosts, strict=True)]
+        span = np.asarray(hosts[0].p - hosts[1].p) + arms[0] - arms[1]
+        s = span / np.linalg.norm(span, axis=1, keepdims=True)
+        k, c = (np.asarray(each) for each in legs.strut.tangent(legs.geometry.nominal_length))
+        for name, motion, arm in zip(legs.hosts, hosts, arms, strict=True):
+            mass, inertia = _with_units(satellite, name)
+            R = np.asarray(motion.R_AX)
+            M = block_diag(mass * np.eye(3), R @ inertia @ R.T)
+            rows = np.concatenate([s, np.cross(arm, s)], axis=1)
+            stiff = eigh(rows.T @ (k[:, None] * rows), M)[0]
+            damped = eigh(rows.T @ (c[:, None] * rows), M)[0]
+            fastest = max(fastest, float(np.sqrt(np.max(stiff))), float(np.max(damped)))
     return fastest
+
+
+def _with_units(satellite: Satellite, name: str) -> tuple[float, np.ndarray]:
+    """Mass [kg] and inertia [kg m^2] of a body with its units as points."""
+    body = satellite.body(name)
+    mass, inertia = float(body.mass_X), np.asarray(body.I_XXcm_X)
+    for cluster in satellite.clusters:
+        if cluster.hosts[0] == name:
+            unit = np.asarray(cluster.units.gimbal_mass + cluster.units.rotor_mass)
+            points = map(point_inertia, unit, np.asarray(cluster.units.p_PC_P))
+            mass, inertia = mass + unit.sum(), inertia + sum(map(np.asarray, points))
+    return mass, inertia
 
 
 def _largest(vectors: Float[Array, "time 3"]) -> float:
     return float(jnp.max(jnp.linalg.norm(vectors, axis=1)))
 
 
-def _read(mujoco, model, data, satellite: Satellite) -> State:
+def _read(mujoco, model, data, mechanism: Mechanism) -> Motion:
     mujoco.mj_fwdPosition(model, data)
     mujoco.mj_fwdVelocity(model, data)
     bodies = []
-    for name in ("bus", "plate"):
+    for name in mechanism.names:
         body = data.body(name)
         J, Jw = np.zeros((2, 3, model.nv))
         mujoco.mj_jac(model, data, J, Jw, body.xpos, body.id)
         rate = body.xmat.reshape(3, 3).T @ Jw @ data.qvel
         bodies.append((body.xpos.copy(), body.xquat.copy(), J @ data.qvel, rate))
-    cmgs = range(len(satellite.cluster.rotor_speed))
-    gimbals = np.zeros((2, len(cmgs)))  # wheels have none
-    if not satellite.cluster.wheels:
-        joints = [data.joint(f"gimbal{j}") for j in cmgs]
-        gimbals = np.array([[joint.qpos[0], joint.qvel[0]] for joint in joints]).T
-    (p_B, q_B, v_B, w_B), (p_P, q_P, v_P, w_P) = bodies
-    return State(
-        p_NB_N=p_B,
-        q_NB=q_B,
-        p_NP_N=p_P,
-        q_NP=q_P,
-        v_NB_N=v_B,
-        w_NB_B=w_B,
-        v_NP_N=v_P,
-        w_NP_P=w_P,
-        gimbal_angle=gimbals[0],
-        gimbal_rate=gimbals[1],
-        error_integral=jnp.zeros(3),
-    )
+    wheel = mechanism.units.wheel
+    gimbals, rotors = np.zeros((2, len(wheel))), np.zeros((2, len(wheel)))  # wheels have no gimbal
+    for found, joint, which in (
+        (gimbals, "gimbal", np.flatnonzero(~wheel)),
+        (rotors, "rotor", np.arange(len(wheel))),
+    ):
+        for j in which:
+            one = data.joint(f"{joint}{j}")
+            found[:, j] = one.qpos[0], one.qvel[0]
+    p, q, v, w = (np.array(each) for each in zip(*bodies, strict=True))
+    return Motion(p, q, v, w, gimbals[0], gimbals[1], rotors[0], rotors[1], np.zeros(3))

@@ -9,7 +9,7 @@ import pytest
 
 import quietbus as qb
 from oracles.linear_systems import random_system
-from oracles.satellites import paper_satellite
+from oracles.satellites import paper_satellite, with_control
 from quietbus.analysis.control.controlled import controlled
 from quietbus.analysis.control.coupled import analyze_coupled, critical_gains, stable_gain_range
 from quietbus.analysis.control.loop import attitude_loop
@@ -29,10 +29,10 @@ SEPARATION = 0.25 * np.sqrt(2.0)
 def bare(inertia=(1100.0, 900.0, 800.0), mass=1000.0):
     """What the paper assumes, but free: no leg mass, friction, rotor momentum or products."""
     satellite = without_friction(without_leg_mass(qb.analyze("zhang2012").satellite))
-    bus = replace(
-        satellite.bus, mass=jnp.asarray(mass), I_BBcm_B=jnp.diag(jnp.asarray(inertia, float))
-    )
-    return without_rotation(replace(satellite, bus=bus))
+    bus, plate = satellite.bodies
+    tensor = jnp.diag(jnp.asarray(inertia, float))
+    bus = replace(bus, mass_X=jnp.asarray(mass), I_XXcm_X=tensor)
+    return without_rotation(replace(satellite, bodies=(bus, plate)))
 
 
 def system_of(satellite, pid=PAPER, actuator="ideal"):
@@ -178,14 +178,17 @@ def test_nonlinear_flight_diverges_above_the_coupled_limit_and_settles_below():
     for factor in (1.1, 0.9):
         gain = factor * high / PAPER.kd
         controller = replace(
-            satellite.controller,
+            satellite.control.controller,
             kp=jnp.asarray(gain * PAPER.kp),
             ki=jnp.asarray(gain * PAPER.ki),
             kd=jnp.asarray(gain * PAPER.kd),
         )
-        flown = fly(replace(satellite, controller=controller), start, jnp.asarray(times), 1e-10)
+        flown = fly(
+            with_control(satellite, controller=controller), start, jnp.asarray(times), 1e-10
+        )
         # rate of the plate: what the oscillation shakes most
-        shake = np.asarray(flown.w_NP_P)[:, 1] - np.asarray(flown.w_NB_B)[:, 1]
+        rate = {name: np.asarray(body.w_NX_X) for name, body in flown.bodies.items()}
+        shake = rate["plate"][:, 1] - rate["bus"][:, 1]
         early, late = (np.ptp(shake[(times > t) & (times < t + 1.0)]) for t in (3.0, 7.0))
         growth = np.log(late / early) / 4.0
         abscissa = float(system.abscissa(factor * high))

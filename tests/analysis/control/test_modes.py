@@ -8,7 +8,8 @@ import pytest
 
 from oracles.satellites import paper_satellite
 from quietbus.analysis.control.modes import fixed_base_modes, free_modes
-from quietbus.dynamics.linearize import OperatingPoint, clamped, linearize, platform_inertia
+from quietbus.dynamics.linearize import OperatingPoint, linearize, platform_inertia
+from quietbus.model.variants import with_base_fixed
 from quietbus.validate.trajectory import massless_legs
 
 STIFFNESS, DAMPING, COUPLING = 2e4, 500.0, np.sqrt(2.0) / 4.0
@@ -20,7 +21,7 @@ def light():
 
 def fixed(satellite, gamma=0.0):
     point = OperatingPoint(np.zeros(3), np.full(4, gamma))
-    return fixed_base_modes(linearize(clamped(satellite), point, "ideal"))
+    return fixed_base_modes(linearize(with_base_fixed(satellite), point, "ideal"))
 
 
 def named(modes, word):
@@ -29,7 +30,7 @@ def named(modes, word):
 
 def test_fixed_base_frequencies_are_those_of_the_papers_stiffness():
     """K/k = diag(2, 2, 2, 1/4, 1/4, 3/4) with coupling sqrt(2)/4 (facts, section 8)."""
-    mass, _, inertia = platform_inertia(light(), np.zeros(4))
+    mass, _, inertia = platform_inertia(light(), np.zeros(4), "plate")
     pair = np.array([[2.0, -COUPLING], [-COUPLING, 0.25]]) * STIFFNESS
     scale = 1.0 / np.sqrt([mass, inertia[0, 0]])
     rocking = np.sqrt(np.linalg.eigvalsh(scale[:, None] * pair * scale)) / (2 * np.pi)
@@ -51,7 +52,7 @@ def test_shapes_on_a_fixed_base_are_eigenvectors_of_the_papers_stiffness():
     (heave,), (twist,) = named(modes, "translation z"), named(modes, "rotation z")
     np.testing.assert_allclose(np.abs(heave.shape), np.eye(12)[2], atol=1e-8)
     np.testing.assert_allclose(np.abs(twist.shape), np.eye(12)[5], atol=1e-8)
-    mass, _, inertia = platform_inertia(light(), np.zeros(4))
+    mass, _, inertia = platform_inertia(light(), np.zeros(4), "plate")
     for mode in modes:
         if mode in (heave, twist):
             continue
@@ -71,7 +72,7 @@ def test_cluster_momentum_splits_the_rocking_modes(gamma):
     m zeta'' + u (2 zeta + i b phi) = 0,  I phi'' - i H phi' + u (phi/4 - i b zeta) = 0.
     """
     satellite = light()
-    mass, _, inertia = platform_inertia(satellite, np.full(4, gamma))
+    mass, _, inertia = platform_inertia(satellite, np.full(4, gamma), "plate")
     assert inertia[0, 0] == pytest.approx(inertia[1, 1])
     H = 4 * 15.0 * np.sin(gamma) * np.sin(np.deg2rad(53.13))
     u = np.array([DAMPING, STIFFNESS])
@@ -104,7 +105,7 @@ def test_direction_of_the_whirl_follows_the_momentum():
 def test_free_heave_is_that_of_two_bodies():
     """Reduced mass of bus and plate; the shape conserves momentum."""
     satellite = light()
-    mass, bus = platform_inertia(satellite, np.zeros(4))[0], 1000.0
+    mass, bus = platform_inertia(satellite, np.zeros(4), "plate")[0], 1000.0
     modes = free_modes(linearize(satellite, OperatingPoint(np.zeros(3), np.zeros(4)), "ideal"))
     (heave,) = named(modes, "translation z")
     omega = np.sqrt(2.0 * STIFFNESS * (1.0 / mass + 1.0 / bus))
@@ -116,12 +117,13 @@ def test_free_heave_is_that_of_two_bodies():
 
 def test_free_twist_is_that_of_two_inertias():
     satellite = light()
-    bus = replace(satellite.bus, I_BBcm_B=jnp.diag(jnp.array([1100.0, 900.0, 800.0])))
+    bus, plate = satellite.bodies
+    bus = replace(bus, I_XXcm_X=jnp.diag(jnp.array([1100.0, 900.0, 800.0])))
     model = linearize(
-        replace(satellite, bus=bus), OperatingPoint(np.zeros(3), np.zeros(4)), "ideal"
+        replace(satellite, bodies=(bus, plate)), OperatingPoint(np.zeros(3), np.zeros(4)), "ideal"
     )
     (twist,) = named(free_modes(model), "rotation z")
-    inertia = platform_inertia(satellite, np.zeros(4))[2][2, 2]
+    inertia = platform_inertia(satellite, np.zeros(4), "plate")[2][2, 2]
     omega = np.sqrt(0.75 * STIFFNESS * (1.0 / inertia + 1.0 / 800.0))
     assert twist.frequency_hz == pytest.approx(omega / (2 * np.pi), rel=1e-9)
     assert twist.shape[11] / twist.shape[5] == pytest.approx(-inertia / 800.0)

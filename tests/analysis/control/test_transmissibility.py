@@ -9,7 +9,8 @@ import quietbus as qb
 from oracles.satellites import paper_satellite
 from quietbus.analysis.control.hexapod import hexapod_isolator
 from quietbus.analysis.control.transmissibility import Places, transmissibility
-from quietbus.dynamics.linearize import OperatingPoint, clamped, linearize, platform_inertia
+from quietbus.dynamics.linearize import OperatingPoint, linearize, platform_inertia
+from quietbus.model.variants import with_base_fixed, with_mount, without_rotation
 from quietbus.spatial.rotation import quaternion_to_matrix
 from quietbus.validate.trajectory import massless_legs
 
@@ -20,55 +21,53 @@ BASE = np.array([0.0, 0.0, 0.6])
 
 def passed(satellite, frequency=HZ):
     places = Places(
-        mass=float(satellite.bus.mass),
-        inertia=np.asarray(satellite.bus.I_BBcm_B),
+        mass=float(satellite.bus.mass_X),
+        inertia=np.asarray(satellite.bus.I_XXcm_X),
         base=BASE,
-        R_BP=np.asarray(quaternion_to_matrix(satellite.q_BP)),
-        center=platform_inertia(satellite, np.zeros(4))[1],
+        R_BP=np.asarray(quaternion_to_matrix(satellite.mounts[0].q_BX)),
+        center=platform_inertia(satellite, np.zeros(4), "plate")[1],
     )
-    rigid = linearize(replace(satellite, mount="rigid"), REST, "ideal")
+    rigid = linearize(with_mount(satellite, welded=True), REST, "ideal")
     return transmissibility(linearize(satellite, REST, "ideal"), rigid, places, frequency)
-
-
-def still(satellite):
-    cluster = replace(satellite.cluster, rotor_speed=0.0 * satellite.cluster.rotor_speed)
-    return replace(satellite, cluster=cluster)
 
 
 def uneven():
     """Massless legs of unlike stiffness and damping under a plate that is not balanced."""
-    satellite = still(massless_legs(paper_satellite(imbalance=0.0)))
-    legs = replace(
-        satellite.legs,
-        stiffness=satellite.legs.stiffness * jnp.linspace(0.7, 1.4, 6),
-        damping=satellite.legs.damping * jnp.linspace(1.5, 0.6, 6),
+    satellite = without_rotation(massless_legs(paper_satellite(imbalance=0.0)))
+    (legs,), (bus, plate) = satellite.hexapods, satellite.bodies
+    strut = replace(
+        legs.strut,
+        stiffness=legs.strut.stiffness * jnp.linspace(0.7, 1.4, 6),
+        damping=legs.strut.damping * jnp.linspace(1.5, 0.6, 6),
     )
-    plate = replace(satellite.plate, p_PPcm_P=jnp.array([0.1, -0.2, 0.15]))
-    return replace(satellite, legs=legs, plate=plate)
+    plate = replace(plate, p_XXcm_X=jnp.array([0.1, -0.2, 0.15]))
+    return replace(satellite, hexapods=(replace(legs, strut=strut),), bodies=(bus, plate))
 
 
 def test_fixed_base_is_the_hexapod_isolator():
     satellite = uneven()
-    mass, center, inertia = platform_inertia(satellite, np.zeros(4))
+    mass, center, inertia = platform_inertia(satellite, np.zeros(4), "plate")
     isolator = hexapod_isolator(
-        np.asarray(satellite.legs.p_PU_P),
-        np.asarray(satellite.legs.p_BA_B) - BASE,
+        np.asarray(satellite.hexapods[0].geometry.p_PU_P),
+        np.asarray(satellite.hexapods[0].geometry.p_BA_B) - BASE,
         0.25 * np.sqrt(2.0),
         mass,
         inertia,
         center,
-        np.asarray(satellite.legs.stiffness),
-        np.asarray(satellite.legs.damping),
+        np.asarray(satellite.hexapods[0].strut.stiffness),
+        np.asarray(satellite.hexapods[0].strut.damping),
     )
     expected = isolator.transmissibility(2 * np.pi * HZ)
     size = np.abs(expected).max(axis=(1, 2), keepdims=True)
-    np.testing.assert_allclose(passed(clamped(satellite)).base / size, expected / size, atol=1e-8)
+    np.testing.assert_allclose(
+        passed(with_base_fixed(satellite)).base / size, expected / size, atol=1e-8
+    )
 
 
 def test_what_the_base_does_not_get_the_plate_keeps():
     """Momentum of the plate and its CMGs, from the motion of the plate alone."""
     satellite = uneven()
-    mass, center, inertia = platform_inertia(satellite, np.zeros(4))
+    mass, center, inertia = platform_inertia(satellite, np.zeros(4), "plate")
     model = linearize(satellite, REST, "ideal")
     s = 2j * np.pi * HZ[:, None, None]
     outputs = ["plate_velocity", "bus_velocity", "plate_rate"]

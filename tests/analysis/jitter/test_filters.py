@@ -7,11 +7,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from oracles.satellites import awkward_satellite, paper_satellite
+from oracles.satellites import awkward_satellite, paper_satellite, with_units
+from oracles.satellites import uncontrolled as without_control
 from quietbus.analysis.control.isolator import SingleAxisIsolator, transmissibility
 from quietbus.analysis.jitter.filters import filtered_jitter_of_designs, platform_at_rest
 from quietbus.analysis.jitter.lines import steady_jitter
-from quietbus.model.body import Bus, Plate
 from quietbus.model.satellite import Satellite
 from quietbus.model.variants import without_friction, without_leg_mass
 
@@ -21,38 +21,39 @@ HZ = np.array([0.5, 2.5, 3.8, 5.0, 20.0, 100.0, 200.0])
 
 
 def uncontrolled(satellite: Satellite) -> Satellite:
-    return without_friction(without_leg_mass(replace(satellite, controller=None, steering=None)))
+    return without_friction(without_leg_mass(without_control(satellite)))
 
 
 def heavy(satellite: Satellite) -> Satellite:
     """A bus that does not move to speak of, without products of inertia."""
-    return replace(satellite, bus=Bus(jnp.array(1e12), 1e12 * jnp.diag(jnp.array([1.1, 0.9, 0.8]))))
+    bus, plate = satellite.bodies
+    inertia = 1e12 * jnp.diag(jnp.array([1.1, 0.9, 0.8]))
+    bus = replace(bus, mass_X=jnp.array(1e12), I_XXcm_X=inertia)
+    return replace(satellite, bodies=(bus, plate))
 
 
 def with_mass_centre(satellite: Satellite, height: float) -> Satellite:
     """Plate and CMGs moved along plate z against the joints."""
     shift = jnp.array([0.0, 0.0, height])
-    plate = Plate(satellite.plate.mass, satellite.plate.p_PPcm_P + shift, satellite.plate.I_PPcm_P)
-    cluster = replace(satellite.cluster, p_PC_P=satellite.cluster.p_PC_P + shift)
-    return replace(satellite, plate=plate, cluster=cluster)
+    bus, plate = satellite.bodies
+    plate = replace(plate, p_XXcm_X=plate.p_XXcm_X + shift)
+    moved = with_units(satellite, p_PC_P=satellite.clusters[0].units.p_PC_P + shift)
+    return replace(moved, bodies=(bus, plate))
 
 
 def at_speeds(satellite: Satellite) -> list[Satellite]:
-    cluster = satellite.cluster
-    ones = jnp.ones_like(cluster.rotor_speed)
-    return [
-        replace(satellite, cluster=replace(cluster, rotor_speed=2.0 * np.pi * hz * ones))
-        for hz in HZ
-    ]
+    ones = jnp.ones(satellite.count)
+    return [with_units(satellite, rotor_speed=2.0 * np.pi * hz * ones) for hz in HZ]
 
 
 @pytest.fixture(scope="module")
 def found():
     """Jitter (speed, cmg, order, axis) of several satellites, one program for all."""
     paper = uncontrolled(paper_satellite())
-    turned = replace(awkward_satellite(), controller=None, steering=None)
-    legs = replace(turned.legs, free_length=turned.legs.nominal_length)  # no preload
-    turned = heavy(without_friction(without_leg_mass(replace(turned, legs=legs))))
+    turned = uncontrolled(awkward_satellite())
+    (legs,) = turned.hexapods
+    strut = replace(legs.strut, free_length=legs.geometry.nominal_length)  # no preload
+    turned = heavy(replace(turned, hexapods=(replace(legs, strut=strut),)))
     cases = {
         "paper": paper,
         "heavy": heavy(paper),

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from quietbus.analysis.control.pid import PID
-from quietbus.dynamics.linearize import LinearModel
+from quietbus.dynamics.linear_model import LinearModel
 
 
 @dataclass(frozen=True)

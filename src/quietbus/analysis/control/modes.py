@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quietbus.dynamics.linearize import LinearModel
+from quietbus.dynamics.linear_model import LinearModel
 
 RIGID_BODY = (
     1e-4  # [rad/s] slower is a rigid-body motion: a double pole at zero, spread by rounding

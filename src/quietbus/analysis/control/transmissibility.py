@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quietbus.dynamics.linearize import LinearModel
+from quietbus.dynamics.linear_model import LinearModel
 
 
 @dataclass(frozen=True)

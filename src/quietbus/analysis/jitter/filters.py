@@ -8,7 +8,6 @@ held bus, about the platform's mass centre and along its axes (docs/theory.md, s
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import equinox as eqx
 import jax
@@ -17,17 +16,11 @@ import numpy as np
 from jaxtyping import Array, Complex, Float
 
 from quietbus.analysis.jitter.lines import at_rest, for_designs
-from quietbus.dynamics.vibration import (
-    Coefficients,
-    SlowMotion,
-    Vibration,
-    body_coefficients,
-    leg_coefficients,
-    rotor_forces,
-    vibration,
-)
-from quietbus.model.disturbance import orders_of
-from quietbus.model.satellite import Satellite
+from quietbus.dynamics.coefficients import SlowMotion, coefficients
+from quietbus.dynamics.rotor_response import orders_of, rotor_forces, rotor_speeds
+from quietbus.dynamics.vibration import Vibration, vibration
+from quietbus.model.satellite import BUS, Satellite
+from quietbus.model.variants import with_mount
 
 
 class HeldPlatform(eqx.Module):
@@ -72,20 +65,25 @@ class HeldPlatform(eqx.Module):
         return jnp.linalg.inv(S).T @ passed @ S.T
 
 
-def held_platform(slow: SlowMotion, legs: Coefficients, bodies: Coefficients) -> HeldPlatform:
-    """The platform of a satellite at rest; arguments as of ``vibration``."""
+def held_platform(averaged: Satellite, slow: SlowMotion) -> HeldPlatform:
+    """The first platform of a satellite at rest."""
+    name = averaged.mounts[0].body
+    legs = coefficients([e for e in averaged.hexapods if e.hosts[0] == name], slow)
+    own = coefficients([e for e in averaged.elements if e.hosts == (name,)], slow)
+    sum_of = lambda parts, kind: sum(getattr(part, kind)[:6, :6] for part in parts)  # noqa: E731
+    M = sum_of(own, "M")
     # the first moment of mass about P, from the mass matrix on (v_P, w_P)
-    m, mc = bodies.M[0, 0], bodies.M[3:6, :3]
-    R = slow.plates.R_NP
+    m, mc = M[0, 0], M[3:6, :3]
+    R = slow.now.motions[name].R_AX
     c_skew = R.T @ mc @ R / m
     zero = jnp.zeros((3, 3))
     S = jnp.block([[R, R @ c_skew], [zero, R]])
-    on_plate = lambda matrix: S.T @ matrix[:6, :6] @ S  # noqa: E731
+    on_plate = lambda matrix: S.T @ matrix @ S  # noqa: E731
     return HeldPlatform(
-        on_plate(bodies.M),
-        on_plate(-legs.by_speed),
-        on_plate(-bodies.by_speed),
-        on_plate(-legs.by_pose),
+        on_plate(M),
+        on_plate(-sum_of(legs, "by_speed")),
+        on_plate(-sum_of(own, "by_speed")),
+        on_plate(-sum_of(legs, "by_pose")),
         S,
     )
 
@@ -122,34 +120,35 @@ def filtered_jitter(satellite: Satellite, gimbal_angle: Float[Array, " cmg"]) ->
             (preloaded struts) gives numbers without meaning: see ``analysis.jitter.rest_error``.
         gimbal_angle: (cmg,) [rad].
     """
-    satellite, slow, moments = at_rest(replace(satellite, mount="isolated"), gimbal_angle)
-    legs = leg_coefficients(satellite, slow)
-    bodies = body_coefficients(satellite, slow, moments.averaged())
-    platform = held_platform(slow, legs, bodies)
-    isolated = vibration(satellite, slow, moments, legs)
-    rigid = vibration(replace(satellite, mount="rigid"), slow, moments, legs)
-    forces = rotor_forces(satellite, slow, moments)
+    full, averaged, slow = at_rest(with_mount(satellite, False), gimbal_angle)
+    _, welded, held = at_rest(with_mount(satellite, True), gimbal_angle)
+    platform = held_platform(averaged, slow)
+    isolated, rigid = vibration(averaged, slow), vibration(welded, held)
+    layout = slow.now.layout
+    rows = layout.rows(averaged.mounts[0].body)
+    forces = rotor_forces(full, isolated)
 
-    def line(s: Complex[Array, ""], force: Complex[Array, "12"]) -> FilteredJitter:
+    def line(s: Complex[Array, ""], force: Complex[Array, " n"]) -> FilteredJitter:
         standing = s == 0.0  # a rotor that stands still shakes nothing
         s = jnp.where(standing, 1j, s)
 
         def rate(small: Vibration, wrench: Complex[Array, "6"]) -> Complex[Array, "3"]:
-            xi = small.respond(s, jnp.pad(wrench, (0, 6))[:, None])[9:, 0]
-            return jnp.where(standing, 0.0, s * xi)
+            on_all = jnp.zeros((layout.size, 1), complex).at[rows, 0].set(wrench)
+            xi = small.respond(s, on_all)[small.free.rows(BUS), 0]
+            return jnp.where(standing, 0.0, s * xi[3:])
 
         def stand_in(passed: Complex[Array, "6 6"]) -> Complex[Array, "3"]:
-            return rate(rigid, platform.at_plate(passed) @ force[:6])
+            return rate(rigid, platform.at_plate(passed) @ force[rows])
 
         return FilteredJitter(
-            full=rate(isolated, force[:6]),
+            full=rate(isolated, force[rows]),
             coupled=stand_in(platform.coupled(s)),
             filters=stand_in(platform.filters(s)),
             springs=stand_in(platform.filters(s, damper=False)),
-            rigid=rate(rigid, force[:6]),
+            rigid=rate(rigid, force[rows]),
         )
 
-    s = 1j * moments.rotor_speed[:, None] * orders_of(satellite.disturbance)
+    s = 1j * rotor_speeds(full, isolated)[:, None] * jnp.array(orders_of(full))
     return jax.vmap(jax.vmap(line))(s, jnp.swapaxes(forces, 0, 1))
 
 
@@ -178,6 +177,5 @@ def platform_at_rest(satellite: Satellite, gimbal_angle: np.ndarray) -> HeldPlat
 
 @eqx.filter_jit
 def _compiled_platform(satellite, gimbal_angle):
-    satellite, slow, moments = at_rest(replace(satellite, mount="isolated"), gimbal_angle)
-    legs = leg_coefficients(satellite, slow)
-    return held_platform(slow, legs, body_coefficients(satellite, slow, moments.averaged()))
+    _, averaged, slow = at_rest(with_mount(satellite, False), gimbal_angle)
+    return held_platform(averaged, slow)

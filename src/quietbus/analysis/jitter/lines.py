@@ -11,19 +11,12 @@ import numpy as np
 from jaxtyping import Array, Complex, Float
 
 from quietbus.dynamics.closed_loop import initial_state
-from quietbus.dynamics.vibration import (
-    NOTHING_SEEN,
-    SlowMotion,
-    Vibration,
-    leg_coefficients,
-    linear_outputs,
-    rotor_response,
-    slow_motion,
-    vibration,
-)
-from quietbus.model.cmg import ClusterMoments
-from quietbus.model.disturbance import orders_of
-from quietbus.model.guidance import StepGuidance
+from quietbus.dynamics.coefficients import SlowMotion, slow_motion
+from quietbus.dynamics.rotor_response import orders_of, rotor_response, rotor_speeds
+from quietbus.dynamics.vibration import Vibration, vibration
+from quietbus.dynamics.views import NOTHING_SEEN, View, linear_outputs
+from quietbus.model import variants
+from quietbus.model.cluster import Cluster
 from quietbus.model.satellite import Satellite
 
 Result = TypeVar("Result")
@@ -32,35 +25,31 @@ AT_REST = 1e-6  # [m/s^2, rad/s^2] accelerations smaller than this are none
 
 def at_rest(
     satellite: Satellite, gimbal_angle: Float[Array, " cmg"]
-) -> tuple[Satellite, SlowMotion, ClusterMoments]:
-    """The satellite at its target, its plate in the nominal pose, free of loads.
+) -> tuple[Satellite, Satellite, SlowMotion]:
+    """The satellite at its target, its bodies in the nominal pose, free of loads.
 
-    Rotors that run up have their nominal speeds.
+    Rotors that run up have their nominal speeds. Also the averaged satellite, and its motion.
     """
-    unit = jnp.array([1.0, 0.0, 0.0, 0.0])
-    satellite = replace(satellite, guidance=StepGuidance(unit), loads=())
+    satellite = variants.at_rest(satellite).prepared()
+    averaged, unit = satellite.averaged(), jnp.array([1.0, 0.0, 0.0, 0.0])
     state = initial_state(satellite, unit, jnp.zeros(3), gimbal_angle)
-    if satellite.cluster.run_up is not None:
-        state = replace(state, rotor=None)
-    moments = ClusterMoments.expand(satellite.cluster)
-    slow = slow_motion(satellite, jnp.zeros(()), state, moments.averaged())
-    return satellite, slow, moments
+    return satellite, averaged, slow_motion(averaged, jnp.zeros(()), state)
 
 
 def steady_jitter(
-    satellite: Satellite, gimbal_angle: Float[Array, " cmg"]
+    satellite: Satellite, gimbal_angle: Float[Array, " cmg"], view: View = NOTHING_SEEN
 ) -> tuple[dict[str, Complex[Array, "cmg order ..."]], Vibration]:
-    """Amplitudes of the outputs (``dynamics.vibration.linear_outputs``) with the satellite at rest.
+    """Amplitudes of the outputs (``dynamics.views.linear_outputs``) with the satellite at rest.
 
-    The satellite is at its target, its plate in the nominal pose, rotors at their nominal speeds,
+    The satellite is at its target, its bodies in the nominal pose, rotors at their nominal speeds,
     no load acts; ``rest_error`` tells whether that is an equilibrium. Also the equations that the
     amplitudes solve.
     """
-    satellite, slow, moments = at_rest(satellite, gimbal_angle)
-    small = vibration(satellite, slow, moments, leg_coefficients(satellite, slow))
-    xi = rotor_response(satellite, small, moments)
-    s = 1j * slow.rotor_speed[:, None] * orders_of(satellite.disturbance)
-    outputs = jax.vmap(jax.vmap(lambda s, x: linear_outputs(satellite, small, s, x, NOTHING_SEEN)))
+    satellite, averaged, slow = at_rest(satellite, gimbal_angle)
+    small = vibration(averaged, slow)
+    xi = rotor_response(satellite, small)
+    s = 1j * rotor_speeds(satellite, small)[:, None] * jnp.array(orders_of(satellite))
+    outputs = jax.vmap(jax.vmap(lambda s, x: linear_outputs(satellite, small, s, x, view)))
     return outputs(s, xi), small
 
 
@@ -84,24 +73,31 @@ def imbalance_kinds(satellite: Satellite) -> list[Satellite]:
     Last the satellite with all imbalance; none has the rotors' tables. ``budget`` makes the parts
     of a budget of their jitter.
     """
-    if satellite.disturbance is not None:  # kept, so that all have the same orders
-        none = 0.0 * satellite.disturbance.coefficient
-        satellite = replace(satellite, disturbance=replace(satellite.disturbance, coefficient=none))
-    cluster = satellite.cluster
-    speed_axes = jnp.broadcast_to(jnp.eye(3), cluster.R_GF.shape)
-    inertia = cluster.I_RRcm_R
+    each = [_kinds_of(cluster) for cluster in satellite.clusters]
+    return [replace(satellite, clusters=clusters) for clusters in zip(*each, strict=True)]
+
+
+def _kinds_of(cluster: Cluster) -> list[Cluster]:
+    units = cluster.units
+    speed_axes = jnp.broadcast_to(jnp.eye(3), units.R_GF.shape)
+    inertia = units.I_RRcm_R
     transverse = 0.5 * (inertia[:, 1, 1] + inertia[:, 2, 2])
     even = jax.vmap(jnp.diag)(jnp.stack([inertia[:, 0, 0], transverse, transverse], axis=1))
     products = inertia.at[:, 1, 2].set(0.0).at[:, 2, 1].set(0.0)
     products = products - jax.vmap(jnp.diag)(jnp.diagonal(inertia, axis1=1, axis2=2)) + even
-    none = jnp.zeros_like(cluster.eccentricity)
+    none = jnp.zeros_like(units.eccentricity)
     kinds: tuple[dict[str, Any], ...] = (
         {"R_GF": speed_axes, "I_RRcm_R": even},
         {"R_GF": speed_axes, "I_RRcm_R": products, "eccentricity": none},
         {"R_GF": speed_axes},
         {},
     )
-    return [replace(satellite, cluster=replace(cluster, **changes)) for changes in kinds]
+    orders = len(cluster.disturbance.orders)
+    no_tables = cluster.disturbance.with_lines(jnp.zeros((cluster.count, orders), bool))
+    return [
+        replace(cluster, units=replace(units, **changes), disturbance=no_tables, kept=None)
+        for changes in kinds
+    ]
 
 
 def budget(

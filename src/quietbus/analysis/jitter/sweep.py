@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 from quietbus.analysis.control.modes import Mode, mode_of
 from quietbus.dynamics.vibration import Vibration
-from quietbus.model.satellite import Satellite
+from quietbus.model.satellite import BUS, Satellite
 
 SEARCHED_SPEEDS = 400  # where modes are computed to bracket the crossings
 SAME_SPEED = 1e-9  # relative: rotors closer than this turn at one speed
@@ -37,7 +37,7 @@ class SpinningModes:
     G: np.ndarray  # (n, n) skew: what the rotors' momentum does at f = 1
     K: np.ndarray  # (n, n)
     L: np.ndarray  # (n, n) zero at rest
-    shapes: np.ndarray  # (12, n) motion of plate and bus by x
+    shapes: np.ndarray  # (12, n) motion of the platform and of the bus by x
 
     @classmethod
     def between(cls, small: Vibration, factor: np.ndarray) -> "SpinningModes":
@@ -58,8 +58,9 @@ class SpinningModes:
             size = np.max(np.abs(matrix)) + np.max(np.abs(M))  # K is none on a rigid mount
             if np.max(np.abs(matrix - line)) > _PROPORTIONAL * size:
                 raise ValueError("the satellite's vibration does not follow the rotors' speed")
-        T = small.projection
-        shapes = np.eye(12) if T is None else np.asarray(T)[0]
+        layout, T = small.slow.now.layout, np.asarray(small.projection)[0]
+        two = (layout.names[min(1, len(layout.names) - 1)], BUS)
+        shapes = np.concatenate([T[layout.rows(name)] for name in two])
         return cls(M[0], C[0], G, K[0], L, shapes)
 
     def state_matrix(self, factor: float) -> np.ndarray:
@@ -183,11 +184,15 @@ _CHANNELS = {"radial": ((0, 1),), "axial": ((2,),), "rocking": ((4,), (3,))}  # 
 
 def bearing_modes(satellite: Satellite) -> tuple[BearingMode, ...]:
     """Internal modes of the rotors, from the scenario's ``disturbance.resonances``."""
-    disturbance, cluster = satellite.disturbance, satellite.cluster
-    if disturbance is None:
-        return ()
-    period, damping = np.asarray(disturbance.period), np.asarray(disturbance.damping)
-    inertia, speed = np.asarray(cluster.I_RRcm_R), np.asarray(cluster.rotor_speed)
+    period, damping, inertia, speed = (
+        np.concatenate([np.asarray(of(cluster)) for cluster in satellite.clusters])
+        for of in (
+            lambda c: c.disturbance.bearings()[0],
+            lambda c: c.disturbance.bearings()[1],
+            lambda c: c.units.I_RRcm_R,
+            lambda c: c.units.rotor_speed,
+        )
+    )
     alike: dict[tuple[int, float, float, float, float], list[int]] = {}
     for m, name in enumerate(_CHANNELS):
         for j in np.flatnonzero(period[:, m] > 0.0):
@@ -211,11 +216,13 @@ def bearing_critical_speeds(
     satellite: Satellite, orders: Sequence[float], most: float
 ) -> tuple[CriticalSpeed, ...]:
     """Speeds at which a line of a rotor's table meets the mode that it excites."""
-    speed, found = np.asarray(satellite.cluster.rotor_speed), []
+    speed, found = np.asarray(satellite.rotor_speed), []
+    tables = np.concatenate(
+        [np.asarray(c.disturbance.coefficients(tuple(orders))) for c in satellite.clusters]
+    )
     for bearing in bearing_modes(satellite):
-        assert satellite.disturbance is not None
         cmgs = list(bearing.cmgs)
-        coefficient = np.asarray(satellite.disturbance.coefficient)[cmgs]  # (cmg, order, channel)
+        coefficient = tables[cmgs]  # (cmg, order, channel)
         for critical in critical_speeds(bearing.vibration, speed[cmgs[:1]], orders, most):
             frequency = bearing.vibration.frequencies(critical.factor)
             branch = int(np.argmin(np.abs(frequency - critical.order * critical.speed)))

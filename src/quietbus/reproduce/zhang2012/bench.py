@@ -138,7 +138,7 @@ def _envelope(name: str, mount: api.Mount, progress: Callable[[float], None]) ->
 
 def _phases(name: str) -> np.ndarray:
     """(cmg,) [rad] of the rotors."""
-    return np.asarray(load_scenario(name).cluster.phases(), float)
+    return np.asarray(load_scenario(name).units.phases(), float)
 
 
 def jitter_peak(amplitudes: np.ndarray, phases: np.ndarray) -> np.ndarray:

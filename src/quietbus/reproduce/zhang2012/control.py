@@ -69,7 +69,7 @@ def _x_loop(bench: Bench) -> tuple[Loop, LoopAnalysis]:
 
 def _printed_loop(bench: Bench) -> Loop:
     legs = bench.study.scenario.isolator.legs
-    k, c = float(np.mean(legs.stiffness)), float(np.mean(legs.damping))
+    k, c = (float(np.mean(each)) for each in legs.law.spring_and_damper())
     return attitude_loop(*printed_channel(k, c), SATELLITE_INERTIA, CONTROLLER)
 
 
@@ -162,7 +162,9 @@ def _coefficients(bench: Bench) -> dict[str, float]:
 
 
 def _masses(bench: Bench) -> dict[str, float]:
-    mass, _, inertia = platform_inertia(bench.study.satellite, bench.study.gimbal_angle)
+    mass, _, inertia = platform_inertia(
+        bench.study.satellite, bench.study.gimbal_angle, bench.study.satellite.mounts[0].body
+    )
     return {
         "platform_mass": mass,
         "platform_inertia_x": inertia[0, 0],

@@ -1,21 +1,28 @@
 """Figure 4: the model against an independent program, MuJoCo in place of ADAMS."""
 
-from dataclasses import replace
-
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from quietbus.build import build_initial_state
-from quietbus.dynamics.closed_loop import rotor_angles
-from quietbus.dynamics.equations import Wrench, accelerations
+from quietbus.dynamics.equations import accelerations, moving
+from quietbus.dynamics.state import State
+from quietbus.model.element import Rates
+from quietbus.model.satellite import Satellite
 from quietbus.model.variants import without_rotation
 from quietbus.plots.style import COLOURS, DASHES, new_figure, share_legend
 from quietbus.reproduce.parts import Findings
 from quietbus.reproduce.zhang2012.bench import Bench
 from quietbus.validate.reference import Reference
-from quietbus.validate.trajectory import fly, fly_mujoco_to, held_gimbals, massless_legs
+from quietbus.validate.trajectory import (
+    fly,
+    fly_mujoco_to,
+    held_gimbals,
+    load_on,
+    massless_legs,
+)
 
 FORCE = (10.0, 0.0, 30.0)  # [N] on the upper platform
 DURATION = 10.0  # [s]
@@ -26,20 +33,20 @@ def validation(bench: Bench) -> Findings:
     """Figure 4."""
     study = bench.study
     start = build_initial_state(study.scenario, study.satellite)
-    wrench = replace(Wrench.zero(), force_P=jnp.array(FORCE))
-    locked = held_gimbals(without_rotation(study.satellite), wrench)
+    wrenches = load_on(study.satellite, "plate", FORCE)
+    locked = held_gimbals(without_rotation(study.satellite), wrenches)
     struts = massless_legs(locked)
     times = np.linspace(0.0, DURATION, 201)
     ours = fly(struts, start, jnp.asarray(times))
     bench.shop.tell("MuJoCo", 0.3)
-    theirs, own_error = fly_mujoco_to(1e-8, struts, start, wrench, times)
-    moved, moved_there = (np.asarray(s.p_NB_N - s.p_NB_N[0]) for s in (ours, theirs))
+    theirs, own_error = fly_mujoco_to(1e-8, struts, start, wrenches, times)
+    moved, moved_there = (_path(s) for s in (ours, theirs))
     difference = np.abs(moved - moved_there)
 
     bench.shop.tell("accelerations with leg mass", 0.8)
     heavy = fly(locked, start, jnp.asarray(times))
-    apart = np.asarray(heavy.p_NB_N - heavy.p_NB_N[0]) - moved
-    with_legs = _accelerations(locked, heavy, times, wrench)
+    apart = _path(heavy) - moved
+    with_legs = _accelerations(locked, heavy, times, wrenches)
 
     figure = new_figure(5.2, "Base platform pushed through the isolator by (10, 0, 30) N")
     position, error = figure.subplots(2, 1, sharex=True, height_ratios=(1.5, 1))
@@ -53,7 +60,9 @@ def validation(bench: Bench) -> Findings:
     error.set(yscale="log", ylabel="difference [m]", xlabel="time [s]")
     share_legend(figure, position)
     relative = float(np.max(difference) / np.max(np.abs(moved)))
-    turned, turned_there = (Rotation.from_quat(s.q_NB, scalar_first=True) for s in (ours, theirs))
+    turned, turned_there = (
+        Rotation.from_quat(s.bus.q_NX, scalar_first=True) for s in (ours, theirs)
+    )
     apart_by = np.max((turned_there.inv() * turned).magnitude())
     most = np.max((turned[0].inv() * turned).magnitude())
     numbers = {
@@ -75,17 +84,27 @@ def validation(bench: Bench) -> Findings:
     return Findings(figure, caption, numbers)
 
 
-def _accelerations(satellite, states, times: np.ndarray, wrench: Wrench) -> float:
+def _path(states: State) -> np.ndarray:
+    """Of the bus's mass centre from its start [m]."""
+    return np.asarray(states.bus.p_NX_N - states.bus.p_NX_N[0])
+
+
+def _accelerations(
+    satellite: Satellite, states: State, times: np.ndarray, wrenches: np.ndarray
+) -> float:
     """Largest relative difference of accelerations along a flight, legs with mass."""
-    first = jax.tree.map(lambda leaf: leaf[0], states)
-    reference = Reference(satellite, first)
-    errors = []
+    at = lambda i: jax.tree.map(lambda leaf: leaf[i], states)  # noqa: E731
+    reference, errors = Reference(satellite, at(0)), []
     for i in np.linspace(0, len(times) - 1, LOOKS).astype(int):
-        state = jax.tree.map(lambda leaf, i=i: leaf[i], states)
-        still = jnp.zeros_like(state.gimbal_angle)
-        arguments = (state, rotor_angles(satellite, times[i], state), still, wrench)
-        theirs = jax.tree.leaves(reference.accelerations(*arguments))
-        ours = jax.tree.leaves(accelerations(satellite, *arguments))
-        scale = max(np.linalg.norm(a) for a in theirs)
-        errors += [np.linalg.norm(a - b) / scale for a, b in zip(theirs, ours, strict=True)]
+        still = {c.name: Rates(jnp.zeros(c.driven), jnp.zeros(0)) for c in satellite.clusters}
+        theirs = reference.accelerations(times[i], at(i), still, wrenches)
+        ours = np.asarray(_ours(satellite, jnp.asarray(times[i]), at(i), still))
+        off = np.linalg.norm(theirs - ours.reshape(theirs.shape), axis=2)
+        errors.append(np.max(off) / np.max(np.linalg.norm(theirs, axis=2)))
     return float(np.max(errors))
+
+
+@eqx.filter_jit
+def _ours(satellite, t, state, rates):
+    """Under the loads that the satellite has."""
+    return accelerations(satellite, moving(satellite, t, state), rates)

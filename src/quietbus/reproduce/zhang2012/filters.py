@@ -1,7 +1,6 @@
 """What else could stand for the isolator: six decoupled low-pass filters."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import jax.numpy as jnp
 import numpy as np
@@ -15,6 +14,7 @@ from quietbus.analysis.jitter.filters import (
 )
 from quietbus.build import build_satellite
 from quietbus.model.satellite import Satellite
+from quietbus.model.variants import with_rotor_speed
 from quietbus.plots.style import COLOURS, DASHES, new_figure, share_legend
 from quietbus.reproduce.parts import Findings
 from quietbus.reproduce.zhang2012.bench import Bench
@@ -41,7 +41,7 @@ def filters(bench: Bench) -> Findings:
     """Six decoupled second-order low-pass filters against the full model."""
     scenario = bench.study.scenario.with_overrides({"control": "none"})
     satellite = build_satellite(scenario)
-    still = np.zeros(scenario.cluster.count)
+    still = np.zeros(scenario.units.count)
     bench.shop.tell("filters over rotor speed", 0.1)
     sweep = filtered_jitter_of_designs([_at_speed(satellite, w) for w in SPEEDS], still)
     own = filtered_jitter_of_designs([satellite], still)
@@ -66,7 +66,7 @@ def filters(bench: Bench) -> Findings:
             "platform's height\nover the bus [m]",
             HEIGHTS,
             [at_height(satellite, z) for z in HEIGHTS],
-            float(satellite.p_BP_B[2]),
+            float(satellite.mounts[0].p_BX_B[2]),
         ),
         (
             "its mass centre over\nthe upper joints [m]",
@@ -122,15 +122,13 @@ def _rss(rate: np.ndarray) -> np.ndarray:
 
 def _at_speed(satellite: Satellite, speed: float) -> Satellite:
     """All rotors at another speed [rad/s]; their inertia stays, so momentum goes with speed."""
-    cluster = satellite.cluster
-    speeds = np.full(cluster.rotor_speed.shape, speed)
-    return replace(satellite, cluster=replace(cluster, rotor_speed=jnp.asarray(speeds)))
+    return with_rotor_speed(satellite, jnp.full(satellite.count, speed))
 
 
 def with_mass_centre(scenario: Scenario, height: float) -> Scenario:
     """Plate and CMGs of a scenario moved to ``height`` [m] over the upper joints."""
     changes: dict[str, object] = {"isolator.plate.center_of_mass": [0.0, 0.0, height]}
-    if scenario.cluster.pyramid is not None:
+    if scenario.units.blocks[0].pyramid is not None:
         changes["cluster.pyramid.height"] = height
     for j, unit in enumerate(scenario.to_dict()["cluster"].get("units", ())):
         changes[f"cluster.units[{j}].position"] = [*unit["position"][:2], height]
@@ -154,7 +152,7 @@ def _leg_mass(scenario: Scenario, mass: float) -> Scenario:
 
 def _over_momentum(scenario: Scenario) -> np.ndarray:
     """Errors (momentum, draw, axis) of the filters at gimbal angles drawn at random."""
-    count = scenario.cluster.count
+    count = scenario.units.count
     angles = np.random.default_rng(2012).uniform(-np.pi, np.pi, (DRAWS, count))
     designs = []
     for momentum in MOMENTA:

@@ -48,7 +48,7 @@ def printed_ratio() -> float:
 def _imbalance(bench: Bench) -> dict[str, float]:
     """Imbalance of a rotor, and whether the paper's unit can be that of one."""
     scenario = bench.study.scenario
-    cluster = bench.study.satellite.cluster
+    cluster = bench.study.satellite.clusters[0].units
     static = float((cluster.rotor_mass * cluster.eccentricity)[0])  # [kg m]
     dynamic = float(np.linalg.norm(np.asarray(cluster.I_RRcm_R)[0, 0, 1:]))  # [kg m^2]
     inertia = np.diag(np.asarray(cluster.I_RRcm_R)[0])

@@ -11,8 +11,9 @@ from quietbus.analysis.control.channels import Channel
 from quietbus.analysis.control.controlled import controlled
 from quietbus.analysis.control.coupled import analyze_coupled
 from quietbus.analysis.control.rational import peak
-from quietbus.dynamics.kinematics import PlateMotion, leg_motion
 from quietbus.dynamics.linearize import linearize
+from quietbus.model.legs.kinematics import leg_motion
+from quietbus.model.motion import Motion
 from quietbus.model.satellite import Satellite
 from quietbus.model.variants import without_rotation
 from quietbus.plots.style import COLOURS, DASHES, MARKERS, draw_line, new_figure, share_legend
@@ -30,7 +31,8 @@ def universal_joint(bench: Bench) -> Findings:
     run = bench.flight("zhang2012-slew")["isolated"].isel(time=slice(None, None, 50))
     time, rates = run["time"].to_numpy(), run["bus_rate"].to_numpy()
     s, ours, paper, violation, violation_paper = _spins(satellite, rates)
-    axial = np.asarray(satellite.legs.upper.axial_inertia + satellite.legs.lower.axial_inertia)
+    legs = satellite.hexapods[0].bodies
+    axial = np.asarray(legs.upper.axial_inertia + legs.lower.axial_inertia)
     missing = ours - paper  # [rad/s] (time, leg)
     momentum_B = np.einsum("l,tl,tli->ti", axial, missing, s)
     moment = np.gradient(momentum_B, time, axis=0) + np.cross(rates, momentum_B)
@@ -88,9 +90,13 @@ def _spins(satellite: Satellite, rates: np.ndarray) -> tuple[np.ndarray, ...]:
         Directions s (time, leg, 3); spin ours and by eq. 12 (time, leg) [rad/s]; the violation of
         the joint by both, the leg's turn relative to the base about h (time, leg) [rad/s].
     """
-    motion = jax.jit(jax.vmap(lambda w: leg_motion(satellite.legs, _turning(satellite, w))))(
-        jnp.asarray(rates)
-    )
+    legs, mount = satellite.hexapods[0].geometry, satellite.mounts[0]
+
+    def turning(w_B: Array):
+        bus = Motion(jnp.eye(3), jnp.zeros(3), jnp.zeros(3), w_B)
+        return leg_motion(legs, mount.motion(bus), bus)
+
+    motion = jax.jit(jax.vmap(turning))(jnp.asarray(rates))
     s, s_rate, k, ours = (np.asarray(v) for v in (motion.s, motion.s_rate, motion.k, motion.spin))
     h = np.cross(np.cross(k, s), k)
     turn = np.cross(s, s_rate)
@@ -103,16 +109,10 @@ def _spins(satellite: Satellite, rates: np.ndarray) -> tuple[np.ndarray, ...]:
     return s, ours, paper, *violations
 
 
-def _turning(satellite: Satellite, w_B: Array) -> PlateMotion:
-    """Bus and plate turning as one, bus axes."""
-    zero, r = jnp.zeros(3), satellite.p_BP_B
-    return PlateMotion(jnp.eye(3), jnp.eye(3), r, zero, w_B, jnp.cross(w_B, r), w_B)
-
-
 def _peak_momentum(bench: Bench) -> float:
     """[N m s] Largest angular momentum of the bus in the slew, the size to compare with."""
     rates = bench.flight("zhang2012-slew")["isolated"]["bus_rate"].to_numpy()
-    inertia = np.asarray(bench.study.satellite.bus.I_BBcm_B)
+    inertia = np.asarray(bench.study.satellite.bus.I_XXcm_X)
     return float(np.linalg.norm(rates @ inertia, axis=1).max())
 
 
@@ -122,7 +122,7 @@ def margins_by_height(bench: Bench) -> Findings:
     pid, axes_alone = study.pid, study.loop_analyses
     if pid is None or axes_alone is None:
         raise RuntimeError("zhang2012 has no control")
-    here = float(study.satellite.p_BP_B[2])
+    here = float(study.satellite.mounts[0].p_BX_B[2])
     heights = np.unique(np.append(HEIGHTS, here))
     limits = study.limits_by_height(heights)
     coupled = 20.0 * np.log10(limits[:, 1] / pid.gain)
@@ -198,8 +198,9 @@ def corner(bench: Bench) -> Findings:
             there = float(np.abs(channel.response(np.array([2.0 * np.pi * 4.58])))[0])
             numbers["corner_z_below"] = 20.0 * float(np.log10(channel.peak_gain / there))
         numbers[f"corner_{name}_3db"] = channel.minus_3db_frequency_hz or np.nan
-    legs = bench.study.satellite.legs
-    as_printed = printed_channel(float(legs.stiffness[0]), float(legs.damping[0]))
+    legs = bench.study.satellite.hexapods[0]
+    stiffness, damping = legs.strut.tangent(legs.geometry.nominal_length)
+    as_printed = printed_channel(float(stiffness[0]), float(damping[0]))
     numbers["printed_corner"] = peak(*as_printed)[0] / (2.0 * np.pi)
     loops = bench.study.loop_analyses
     numbers["decade"] = numbers["corner_x"] / (loops["x"].bandwidth_hz or np.nan) if loops else 0.0

@@ -34,7 +34,7 @@ PLATFORM_TEXT = (
 def per_cmg(bench: Bench) -> Findings:
     """One platform for the cluster against one isolator per CMG."""
     scenario = bench.study.scenario
-    still = np.zeros(scenario.cluster.count)
+    still = np.zeros(scenario.units.count)
     one = api.platforms([scenario], [still])
     four = _each(scenario, still)
     bench.shop.tell("one platform or four, over rotor speed", 0.2)
@@ -108,7 +108,7 @@ def _over_speed(scenario: Scenario, hz: float) -> tuple[float, float, float]:
             "cluster.rotor.momentum": momentum * speed,
         }
     )
-    still = np.zeros(scenario.cluster.count)
+    still = np.zeros(scenario.units.count)
     one = api.platforms([turned], [still])
     return _norm(one, "rigid"), _norm(one), _norm(_each(turned, still))
 
@@ -134,14 +134,14 @@ def _platform_numbers(
     still: np.ndarray,
 ) -> dict[str, float]:
     whole = platform_at_rest(satellite, still)
-    small = platform_at_rest(four.platforms.satellites[0], still[:1])
+    small = platform_at_rest(four.platforms.satellite, four.platforms.gimbal_angle)
     passed = lambda p: np.diag(np.asarray(p.C)) / np.diag(np.asarray(p.M))  # noqa: E731
     more = passed(small) / passed(whole)
     lighter = np.diag(np.asarray(whole.M)) / np.diag(np.asarray(small.M))
     own_four = _figures(four)
     hz_one, hz_four = one.platforms.modes()[0], four.platforms.modes()[0]
-    stopped = [without_rotation(each) for each in four.platforms.satellites]
-    hz_still = Platforms.assemble(stopped, four.gimbal_angles).modes()[0]
+    stopped = without_rotation(four.platforms.satellite)
+    hz_still = Platforms(stopped, four.platforms.gimbal_angle).modes()[0]
     numbers = {
         "per_cmg_ratio": own_four[0] / own[0],
         "per_cmg_ratio_low": float(drawn.min()),

@@ -92,7 +92,7 @@ def _draw(axes: Axes, values: np.ndarray, ratios: np.ndarray) -> None:
 
 def _ratios(scenario: Scenario, gimbals: np.ndarray) -> np.ndarray:
     """[%] Peak rate isolated over rigid: per axis, and worst axis over worst axis (4,)."""
-    phases = np.asarray(scenario.cluster.phases(), float)
+    phases = np.asarray(scenario.units.phases(), float)
     return _ratios_by_phase(scenario, gimbals, phases[None])[0]
 
 
@@ -109,7 +109,7 @@ def _ratios_by_phase(scenario: Scenario, gimbals: np.ndarray, phases: np.ndarray
 
 def _rotor(scenario: Scenario) -> tuple[float, float, float]:
     """Momentum [N m s], speed [rad/s] and dynamic imbalance [kg m^2] of a rotor."""
-    cluster = build_satellite(scenario).cluster
+    cluster = build_satellite(scenario).clusters[0].units
     imbalance = np.linalg.norm(np.asarray(cluster.I_RRcm_R)[0, 0, 1:])
     return float(cluster.momentum[0]), float(cluster.rotor_speed[0]), float(imbalance)
 

@@ -42,10 +42,11 @@ class Sliding(NamedTuple):
 
 def sliding_leg(bench: Bench) -> Findings:
     """The moment that eq. 22 misses, over the slew."""
-    legs, run = bench.study.satellite.legs, bench.flight("zhang2012-slew")["isolated"]
+    satellite, run = bench.study.satellite, bench.flight("zhang2012-slew")["isolated"]
+    legs, joints = satellite.hexapods[0].bodies, satellite.hexapods[0].geometry
     time, rates = run["time"].to_numpy(), run["bus_rate"].to_numpy()
     slide = CubicSpline(time, run["leg_stroke"].to_numpy())(time, 1)  # [m/s] (time, leg)
-    p_AU_B = np.asarray(bench.study.satellite.p_BP_B + legs.p_PU_P - legs.p_BA_B)
+    p_AU_B = np.asarray(satellite.mounts[0].p_BX_B + joints.p_PU_P - joints.p_BA_B)
     length = np.linalg.norm(p_AU_B, axis=1)
     s = p_AU_B / length[:, None]
     mass, distance = (np.asarray(getattr(legs.upper, name)) for name in ("mass", "distance"))

@@ -1,4 +1,4 @@
-"""Inertia of and forces on the legs in the satellite's twelve speeds.
+"""Inertia of and forces on the legs in the speeds (v_P, w_P, v_B, w_B) of the bodies they join.
 
 A leg's kinetic energy is that of two point masses at its ends, joined, plus what its direction s
 singles out (docs/theory.md):
@@ -14,28 +14,46 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from quietbus.dynamics.kinematics import LegMotion, PlateMotion, leg_accelerations
-from quietbus.model.hexapod import Hexapod
+from quietbus.model.legs.kinematics import LegMotion, leg_accelerations
+from quietbus.model.motion import Motion
 from quietbus.spatial.rotation import skew
 from quietbus.spatial.vector import cross, dot, weighted_products
 
 
+class LegParts(eqx.Module):
+    """Mass properties of the lower or of the upper parts of all legs."""
+
+    mass: Float[Array, " leg"]  # [kg]
+    distance: Float[Array, " leg"]  # [m] from the joint at that part's end to its mass centre
+    transverse_inertia: Float[Array, " leg"]  # [kg m^2] about the mass centre, across the leg
+    axial_inertia: Float[Array, " leg"]  # [kg m^2] about the leg's axis
+
+
+class LegBodies(eqx.Module):
+    """Masses of the legs and friction of their joints."""
+
+    upper: LegParts
+    lower: LegParts
+    spherical_friction: Float[Array, " leg"]  # [N m s/rad]
+    universal_friction: Float[Array, " leg"]  # [N m s/rad]
+
+
 class JointFriction(eqx.Module):
-    """Viscous friction torques on the legs [N m], inertial components."""
+    """Viscous friction torques on the legs [N m]."""
 
     at_U: Float[Array, "leg 3"]
     at_A: Float[Array, "leg 3"]
 
 
-def joint_friction(legs: Hexapod, motion: LegMotion, plates: PlateMotion) -> JointFriction:
+def joint_friction(legs: LegBodies, motion: LegMotion, P: Motion, B: Motion) -> JointFriction:
     """``-c_s (w_leg - w_P)`` at the spherical joints, ``-c_u (w_leg - w_B)`` at the universal."""
     return JointFriction(
-        -legs.spherical_friction[:, None] * (motion.w - plates.w_P),
-        -legs.universal_friction[:, None] * (motion.w - plates.w_B),
+        -legs.spherical_friction[:, None] * (motion.w - P.w),
+        -legs.universal_friction[:, None] * (motion.w - B.w),
     )
 
 
-def leg_mass_matrix(legs: Hexapod, motion: LegMotion) -> Float[Array, "12 12"]:
+def leg_mass_matrix(legs: LegBodies, motion: LegMotion) -> Float[Array, "12 12"]:
     """Mass matrix of all legs on (v_P, w_P, v_B, w_B)."""
     m_u, m_d, I_t, I_a = _masses(legs)
     up, low = legs.upper.distance / motion.length, legs.lower.distance / motion.length
@@ -50,7 +68,7 @@ def leg_mass_matrix(legs: Hexapod, motion: LegMotion) -> Float[Array, "12 12"]:
 
     line_U = jnp.concatenate([motion.s, cross(motion.r_U, motion.s)], axis=1)
     line_A = jnp.concatenate([motion.s, cross(motion.r_A, motion.s)], axis=1)
-    by_v, by_w = motion.spin_by_velocity, motion.spin_by_bus_rate
+    by_v, by_w = motion.spin_by_velocity, motion.spin_by_base_rate
     spin_P = jnp.concatenate([by_v, cross(motion.r_U, by_v)], axis=1)
     spin_B = jnp.concatenate([-by_v, by_w - cross(motion.r_A, by_v)], axis=1)
 
@@ -73,13 +91,21 @@ def leg_mass_matrix(legs: Hexapod, motion: LegMotion) -> Float[Array, "12 12"]:
 
 
 def leg_forces(
-    legs: Hexapod, motion: LegMotion, plates: PlateMotion, u_rate: Float[Array, "12"]
+    legs: LegBodies,
+    motion: LegMotion,
+    P: Motion,
+    B: Motion,
+    u_rate: Float[Array, "12"],
+    tension: Float[Array, " leg"],
 ) -> Float[Array, "12"]:
-    """Forces of struts, friction and the legs' inertia on (v_P, w_P, v_B, w_B), at their rates."""
+    """Forces of struts, friction and the legs' inertia on (v_P, w_P, v_B, w_B), at their rates.
+
+    Args:
+        tension: (leg,) of the struts [N].
+    """
     m_u, m_d, I_t, I_a = (value[:, None] for value in _masses(legs))
-    dv_P, dw_P, dv_B, dw_B = u_rate.reshape(4, 3)
-    bias = leg_accelerations(motion, plates, dv_B, dw_B, dv_P, dw_P)
-    friction = joint_friction(legs, motion, plates)
+    bias = leg_accelerations(motion, P, B, u_rate)
+    friction = joint_friction(legs, motion, P, B)
     torque, s = friction.at_U + friction.at_A, motion.s
     d_u, d_d = legs.upper.distance[:, None], legs.lower.distance[:, None]
     upper = m_u * (bias.a_U - d_u * bias.s)
@@ -89,15 +115,14 @@ def leg_forces(
     across = across + d_u * upper - d_d * lower - I_t * bias.s
     across = (across - dot(s, across)[:, None] * s) / motion.length[:, None]
     about = (dot(torque, s) - I_a[:, 0] * bias.spin)[:, None]
-    strut = legs.strut_force(motion.length, motion.length_rate)[:, None]
-    between = across + about * motion.spin_by_velocity - strut * s
+    between = across + about * motion.spin_by_velocity - tension[:, None] * s
     f_U, f_A = between - upper, -between - lower
     t_P = cross(motion.r_U, f_U) - friction.at_U
-    t_B = cross(motion.r_A, f_A) - friction.at_A + about * motion.spin_by_bus_rate
+    t_B = cross(motion.r_A, f_A) - friction.at_A + about * motion.spin_by_base_rate
     return jnp.sum(jnp.concatenate([f_U, t_P, f_A, t_B], axis=1), axis=0)
 
 
-def _masses(legs: Hexapod) -> tuple[Float[Array, " leg"], ...]:
+def _masses(legs: LegBodies) -> tuple[Float[Array, " leg"], ...]:
     return (
         legs.upper.mass,
         legs.lower.mass,

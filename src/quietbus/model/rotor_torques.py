@@ -9,28 +9,27 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from quietbus.dynamics.closed_loop import ControlSignals
-from quietbus.dynamics.equations import Accelerations
-from quietbus.dynamics.state import State
-from quietbus.model.cmg import ControlMomentGyro
-from quietbus.model.satellite import Satellite
-from quietbus.spatial.rotation import quaternion_to_matrix
+from quietbus.model.moments import Turning
+from quietbus.model.motion import Motion
+from quietbus.model.unit import ControlMomentGyro
+from quietbus.spatial.vector import rotate
 
 
 def rotor_torques(
-    satellite: Satellite, state: State, signals: ControlSignals, acceleration: Accelerations
+    units: ControlMomentGyro,
+    gimbal: Turning,
+    rotor: Turning,
+    P: Motion,
+    u_rate: Float[Array, "6"],
 ) -> Float[Array, " cmg"]:
     """Torque of each motor on its rotor about the spin axis [N m].
 
     Args:
-        state: with the rotors' angles and speeds.
-        signals: what gimbals and rotors are made to do at this state.
-        acceleration: of plate and bus at this state.
+        P: motion of what carries the units.
+        u_rate: (6,) its accelerations (dv, dw).
     """
-    assert state.rotor is not None
-    assert signals.rotor_acceleration is not None
-    R_PN = quaternion_to_matrix(state.q_NP).T
-    w_P, dw_P, dv_P = state.w_NP_P, R_PN @ acceleration.w_P, R_PN @ acceleration.v_P
+    R_PA = P.R_AX.T
+    w_P, dv_P, dw_P = (rotate(R_PA, vector) for vector in (P.w, u_rate[:3], u_rate[3:]))
 
     def torque(cmg: ControlMomentGyro, gamma, gamma_rate, gamma_acceleration, phi, speed, spin_up):
         """All vectors along plate axes."""
@@ -56,11 +55,11 @@ def rotor_torques(
         return x @ (about_centre + cmg.rotor_mass * jnp.cross(e, centre))
 
     return eqx.filter_vmap(torque)(
-        satellite.cluster,
-        state.gimbal_angle,
-        state.gimbal_rate,
-        signals.gimbal_acceleration,
-        state.rotor.angle,
-        state.rotor.speed,
-        signals.rotor_acceleration,
+        units,
+        gimbal.angle,
+        gimbal.rate,
+        gimbal.acceleration,
+        rotor.angle,
+        rotor.rate,
+        rotor.acceleration,
     )

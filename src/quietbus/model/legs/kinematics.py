@@ -1,27 +1,27 @@
-"""Motion of the legs from the motion of the two plates (Zhang and Xu, eq. 4-18)."""
+"""Motion of the legs from the motion of the two bodies they join (Zhang and Xu, eq. 4-18).
+
+All vectors are along the axes of the bodies' motions. P is the upper body, B the base.
+"""
 
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from quietbus.model.hexapod import Hexapod
+from quietbus.model.motion import Motion
 from quietbus.spatial.vector import cross, dot, rotate
 
 
-class PlateMotion(eqx.Module):
-    """Pose and speeds of bus and plate, inertial components."""
+class Geometry(eqx.Module):
+    """Where the joints of all legs are."""
 
-    R_NB: Float[Array, "3 3"]
-    R_NP: Float[Array, "3 3"]
-    p_BP: Float[Array, "3"]  # [m] from the origin of B to that of P
-    v_B: Float[Array, "3"]  # [m/s] of the origin of B
-    w_B: Float[Array, "3"]  # [rad/s]
-    v_P: Float[Array, "3"]  # [m/s] of the origin of P
-    w_P: Float[Array, "3"]  # [rad/s]
+    p_PU_P: Float[Array, "leg 3"]  # [m] spherical joints in the frame P of the upper body
+    p_BA_B: Float[Array, "leg 3"]  # [m] universal joints in the frame B of the base
+    k_B: Float[Array, "leg 3"]  # [-] unit fixed axes of the universal joints, base frame
+    nominal_length: Float[Array, " leg"]  # [m] with both bodies in their nominal pose
 
 
 class LegMotion(eqx.Module):
-    """Positions and rates of all legs at one instant, inertial components."""
+    """Positions and rates of all legs at one instant."""
 
     r_U: Float[Array, "leg 3"]  # [m] spherical joint from the origin of P
     r_A: Float[Array, "leg 3"]  # [m] universal joint from the origin of B
@@ -34,11 +34,11 @@ class LegMotion(eqx.Module):
     kappa: Float[Array, " leg"]  # [-] k . s: 0 at right angles, +-1 where the joint locks
     spin: Float[Array, " leg"]  # [rad/s] leg's angular velocity about its own axis, w_s
     spin_by_velocity: Float[Array, "leg 3"]  # [1/m] d w_s / d(v_U - v_A)
-    spin_by_bus_rate: Float[Array, "leg 3"]  # [-] d w_s / d w_B
+    spin_by_base_rate: Float[Array, "leg 3"]  # [-] d w_s / d w_B
     w: Float[Array, "leg 3"]  # [rad/s] angular velocity (eq. 12)
 
 
-def leg_motion(legs: Hexapod, plates: PlateMotion) -> LegMotion:
+def leg_motion(legs: Geometry, P: Motion, B: Motion) -> LegMotion:
     """Kinematics of all legs (eq. 4-18).
 
     A universal joint lets the leg turn about k and about y = k x s, so the leg's angular velocity
@@ -49,20 +49,20 @@ def leg_motion(legs: Hexapod, plates: PlateMotion) -> LegMotion:
 
     (The paper's eq. 12 leaves w_B out: docs/theory.md.)
     """
-    r_U = rotate(plates.R_NP, legs.p_PU_P)
-    r_A = rotate(plates.R_NB, legs.p_BA_B)
-    k = rotate(plates.R_NB, legs.k_B)
-    span = plates.p_BP + r_U - r_A
+    r_U = rotate(P.R_AX, legs.p_PU_P)
+    r_A = rotate(B.R_AX, legs.p_BA_B)
+    k = rotate(B.R_AX, legs.k_B)
+    span = P.p - B.p + r_U - r_A
     length = jnp.sqrt(dot(span, span))
     s = span / length[:, None]
-    v_rel = plates.v_P + cross(plates.w_P, r_U) - plates.v_B - cross(plates.w_B, r_A)
+    v_rel = P.v - B.v + cross(P.w, r_U) - cross(B.w, r_A)
     length_rate = dot(s, v_rel)
     s_rate = (v_rel - length_rate[:, None] * s) / length[:, None]
     kappa, side = dot(k, s), cross(k, s)
     lever = 1.0 / (1.0 - kappa**2)
     spin_by_velocity = (kappa * lever / length)[:, None] * side
-    spin_by_bus_rate = lever[:, None] * (s - kappa[:, None] * k)
-    spin = dot(spin_by_velocity, v_rel) + dot(spin_by_bus_rate, plates.w_B)
+    spin_by_base_rate = lever[:, None] * (s - kappa[:, None] * k)
+    spin = dot(spin_by_velocity, v_rel) + dot(spin_by_base_rate, B.w)
     w = cross(s, s_rate) + spin[:, None] * s
     return LegMotion(
         r_U,
@@ -76,13 +76,13 @@ def leg_motion(legs: Hexapod, plates: PlateMotion) -> LegMotion:
         kappa,
         spin,
         spin_by_velocity,
-        spin_by_bus_rate,
+        spin_by_base_rate,
         w,
     )
 
 
 class LegAccelerations(eqx.Module):
-    """Second derivatives of the legs' motion, inertial components."""
+    """Second derivatives of the legs' motion."""
 
     a_U: Float[Array, "leg 3"]  # [m/s^2] of the spherical joint
     a_A: Float[Array, "leg 3"]  # [m/s^2] of the universal joint
@@ -91,20 +91,15 @@ class LegAccelerations(eqx.Module):
 
 
 def leg_accelerations(
-    motion: LegMotion,
-    plates: PlateMotion,
-    dv_B: Float[Array, "3"],
-    dw_B: Float[Array, "3"],
-    dv_P: Float[Array, "3"],
-    dw_P: Float[Array, "3"],
+    motion: LegMotion, P: Motion, B: Motion, u_rate: Float[Array, "12"]
 ) -> LegAccelerations:
-    """Accelerations of all legs (eq. 8, 9, 13-19) for accelerations of the two plates.
+    """Accelerations of all legs (eq. 8, 9, 13-19).
 
     Args:
-        dv_B, dv_P: (3,) of the plates' origins [m/s^2].
-        dw_B, dw_P: (3,) angular [rad/s^2].
+        u_rate: (12,) accelerations dv_P, dw_P, dv_B, dw_B of both bodies [m/s^2, rad/s^2].
     """
-    w_B, w_P, s, s_rate = plates.w_B, plates.w_P, motion.s, motion.s_rate
+    dv_P, dw_P, dv_B, dw_B = u_rate.reshape(4, 3)
+    w_B, w_P, s, s_rate = B.w, P.w, motion.s, motion.s_rate
     a_U = dv_P + cross(dw_P, motion.r_U) + cross(w_P, cross(w_P, motion.r_U))
     a_A = dv_B + cross(dw_B, motion.r_A) + cross(w_B, cross(w_B, motion.r_A))
     a_rel = a_U - a_A

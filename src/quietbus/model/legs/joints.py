@@ -8,16 +8,14 @@ Euler's equations are written for the two parts with their own accelerations, so
 import equinox as eqx
 from jaxtyping import Array, Float
 
-from quietbus.dynamics.equations import Accelerations, plate_motion
-from quietbus.dynamics.kinematics import leg_accelerations, leg_motion
-from quietbus.dynamics.legs import joint_friction
-from quietbus.dynamics.state import State
-from quietbus.model.satellite import Satellite
+from quietbus.model.legs.inertia import LegBodies, joint_friction
+from quietbus.model.legs.kinematics import LegMotion, leg_accelerations
+from quietbus.model.motion import Motion
 from quietbus.spatial.vector import cross, dot
 
 
 class JointForces(eqx.Module):
-    """Forces and torque that the joints exert on each leg, inertial components."""
+    """Forces and torque that the joints exert on each leg, along the axes of the motions."""
 
     spherical_force: Float[Array, "leg 3"]  # [N] F_s, plate on upper part
     universal_force: Float[Array, "leg 3"]  # [N] F_u, base on lower part
@@ -25,14 +23,22 @@ class JointForces(eqx.Module):
     universal_axis: Float[Array, "leg 3"]  # [-] h, normal to both axes of the universal joint
 
 
-def joint_forces(satellite: Satellite, state: State, acceleration: Accelerations) -> JointForces:
-    """Joint forces from the motion and its accelerations."""
-    legs, plates = satellite.legs, plate_motion(state)
-    motion = leg_motion(legs, plates)
-    second = leg_accelerations(
-        motion, plates, acceleration.v_B, acceleration.w_B, acceleration.v_P, acceleration.w_P
-    )
-    friction = joint_friction(legs, motion, plates)
+def joint_forces(
+    legs: LegBodies,
+    motion: LegMotion,
+    P: Motion,
+    B: Motion,
+    u_rate: Float[Array, "12"],
+    tension: Float[Array, " leg"],
+) -> JointForces:
+    """Joint forces from the motion and its accelerations.
+
+    Args:
+        u_rate: (12,) accelerations dv_P, dw_P, dv_B, dw_B of both bodies [m/s^2, rad/s^2].
+        tension: (leg,) of the struts [N].
+    """
+    second = leg_accelerations(motion, P, B, u_rate)
+    friction = joint_friction(legs, motion, P, B)
     s, length = motion.s, motion.length[:, None]
     m_u, m_d = legs.upper.mass[:, None], legs.lower.mass[:, None]
     d_u, d_d = legs.upper.distance[:, None], legs.lower.distance[:, None]
@@ -51,8 +57,7 @@ def joint_forces(satellite: Satellite, state: State, acceleration: Accelerations
     h = h / (dot(h, h) ** 0.5)[:, None]
     moment = dot(s, C) / dot(s, h)
     # along s, Newton for the upper part: m_u a_u = F_s - (strut tension) s
-    strut = legs.strut_force(motion.length, motion.length_rate)
-    along = (m_u[:, 0] * dot(s, a_u) + strut)[:, None] * s
+    along = (m_u[:, 0] * dot(s, a_u) + tension)[:, None] * s
     across = cross(C - moment[:, None] * h, s) / length
     F_s = along + across
     return JointForces(F_s, m_u * a_u + m_d * a_d - F_s, moment, h)

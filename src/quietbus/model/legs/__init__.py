@@ -1,0 +1,1 @@
+"""Legs that hold one body on another: kinematics, inertia, struts and joints."""

@@ -1,0 +1,70 @@
+"""Laws of struts: tension from length, its rate, and memory of their own.
+
+A law serves all legs of a hexapod at once. One with memory says how it changes; linearised,
+in vibration and in the energy balance it then takes part as it is.
+"""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+
+class AbstractStrut(eqx.Module):
+    """Struts between the lower and the upper parts of legs; tension is positive."""
+
+    free_length: eqx.AbstractVar[Float[Array, " leg"]]  # [m] at which it is free of force at rest
+
+    def start(self) -> Float[Array, " z"]:
+        """Memory at the start, of a strut at rest at its free length."""
+        return jnp.zeros(0)
+
+    def tension(
+        self, length: Float[Array, " leg"], rate: Float[Array, " leg"], z: Float[Array, " z"]
+    ) -> Float[Array, " leg"]:
+        """Tension [N] at lengths [m] and their rates [m/s]."""
+        raise NotImplementedError
+
+    def tangent(
+        self, length: Float[Array, " leg"]
+    ) -> tuple[Float[Array, " leg"], Float[Array, " leg"]]:
+        """Stiffness [N/m] and damping [N s/m] about lengths at rest, memory held."""
+        z, still, one = self.start(), jnp.zeros_like(length), jnp.ones_like(length)
+        law = lambda length, rate: self.tension(length, rate, z)  # noqa: E731
+        at = (length, still)
+        return jax.jvp(law, at, (one, still))[1], jax.jvp(law, at, (still, one))[1]
+
+    def memory_rate(
+        self, length: Float[Array, " leg"], rate: Float[Array, " leg"], z: Float[Array, " z"]
+    ) -> Float[Array, " z"]:
+        """dz/dt."""
+        return jnp.zeros_like(z)
+
+    def stored(
+        self, length: Float[Array, " leg"], rate: Float[Array, " leg"], z: Float[Array, " z"]
+    ) -> Float[Array, ""]:
+        """Energy [J] in springs."""
+        raise NotImplementedError
+
+    def dissipated(
+        self, length: Float[Array, " leg"], rate: Float[Array, " leg"], z: Float[Array, " z"]
+    ) -> Float[Array, ""]:
+        """Power [W] that dampers take."""
+        raise NotImplementedError
+
+
+class SpringDamper(AbstractStrut):
+    """Linear spring and damper in parallel: ``k (l - l0) + c dl/dt``."""
+
+    stiffness: Float[Array, " leg"]  # [N/m]
+    damping: Float[Array, " leg"]  # [N s/m]
+    free_length: Float[Array, " leg"]  # [m]
+
+    def tension(self, length, rate, z):
+        return self.stiffness * (length - self.free_length) + self.damping * rate
+
+    def stored(self, length, rate, z):
+        return 0.5 * jnp.sum(self.stiffness * (length - self.free_length) ** 2)
+
+    def dissipated(self, length, rate, z):
+        return jnp.sum(self.damping * rate**2)
