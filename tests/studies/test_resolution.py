@@ -21,11 +21,12 @@ def test_ripple_beyond_the_output_rate_is_named_by_the_fastest_gimbal():
         }
     )  # fmt: skip
     rates = np.array([[0.1, -0.2, 0.0, 0.05], [0.0, 0.0, 0.0, 0.0]])
-    said = unseen(scenario, rates)
+    standing = np.zeros((2, 4))
+    said = unseen(scenario, rates, standing)
     assert "simulation.output_rate: expected at least 488.9 Hz" in said
     assert "line 6000 in a turn, at 191 Hz" in said
-    assert unseen(scenario, 0.5 * rates) == ""
-    assert unseen(qb.load_scenario("zhang2012"), rates) == ""
+    assert unseen(scenario, 0.5 * rates, standing) == ""
+    assert unseen(qb.load_scenario("zhang2012"), rates, standing) == ""
 
 
 def test_orders_of_wheels_count_at_the_speed_that_they_reached():

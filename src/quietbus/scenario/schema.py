@@ -6,11 +6,10 @@ import functools
 import json
 import re
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
 from pydantic import BeforeValidator, ValidationError, model_validator
-from scipy.spatial.transform import Rotation
 
 from quietbus.scenario.actuators import Actuators
 from quietbus.scenario.base import (
@@ -49,6 +48,9 @@ from quietbus.scenario.text import read_yaml, write_yaml
 from quietbus.scenario.units import expected, whole_number
 from quietbus.scenario.wheels import WheelCluster, cluster_type, unit_count
 from quietbus.words import shown
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 
 class Tolerances(Part):
@@ -230,6 +232,8 @@ class Scenario(Part):
 
     def place(self, body: str) -> tuple[np.ndarray, Rotation]:
         """Nominal origin [m] and attitude of a body in the bus."""
+        from scipy.spatial.transform import Rotation  # takes as long to load as all else here
+
         if body == BUS:
             return np.zeros(3), Rotation.identity()
         site = next(site for site in self.sites if site.name == body)
