@@ -1,18 +1,25 @@
-"""JAX settings of the whole package: double precision, compilation cache, small loops in one piece.
+"""JAX settings of the whole package: precision, compilation cache, how programs are compiled.
 
 Imported by every package that computes, before it uses JAX. What the user has already chosen
 (``JAX_COMPILATION_CACHE_DIR``, options in ``XLA_FLAGS``) is respected, and the environment stays as
 it is: docs/api.md says what changes in the process.
 """
 
+import functools
 import os
+from collections.abc import Callable
 from importlib.metadata import version
+from typing import TypeVar
 
+import equinox as eqx
 import jax
+import jax.numpy as jnp
 from jaxlib.xla_client import CompileOptions
 from platformdirs import user_cache_path
 
 from quietbus.processes import DeviceError
+
+Function = TypeVar("Function", bound=Callable)
 
 # XLA runs each small operation of a loop as a kernel of its own, with an overhead as large as the
 # operation. Loops that touch less than this many bytes are compiled as one function instead, which
@@ -56,3 +63,32 @@ if os.environ.get("JAX_PLATFORMS", "cpu") not in ("", "cpu"):
             f"JAX_PLATFORMS={os.environ['JAX_PLATFORMS']} asks for a device that JAX does not find "
             "here; leave it out to compute on the processor"
         ) from None
+
+
+def compiled_for_few_runs(function: Function) -> Function:
+    """``equinox.filter_jit`` with little optimisation, for programs that run once or a few times.
+
+    Compilation takes a third of the time, a run twice as long. Values may differ by rounding. Not
+    for use within another program.
+    """
+
+    @functools.cache
+    def compiled():
+        return eqx.filter_jit(function, **_few_runs())
+
+    @functools.wraps(function)
+    def run(*args, **kwargs):
+        return compiled()(*args, **kwargs)
+
+    return run  # type: ignore[return-value]
+
+
+@functools.cache
+def _few_runs() -> dict:
+    """What ``filter_jit`` takes for it; nothing where XLA does not know these options."""
+    options = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 0}
+    try:
+        jax.jit(lambda: jnp.zeros(()), compiler_options=options)()
+    except jax.errors.JaxRuntimeError:
+        return {}
+    return {"compiler_options": options}

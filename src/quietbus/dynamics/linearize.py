@@ -17,7 +17,6 @@ bus axes at the operating point:
     bus_velocity, bus_position
 """
 
-import functools
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Literal, NamedTuple
@@ -33,6 +32,7 @@ from quietbus.dynamics.equations import Moving, accelerations, moving, rates_of
 from quietbus.dynamics.linear_model import LinearModel
 from quietbus.dynamics.outputs import joined
 from quietbus.dynamics.state import BodyState, State
+from quietbus.jaxconfig import compiled_for_few_runs
 from quietbus.model.control import Actuators
 from quietbus.model.element import Own
 from quietbus.model.report import AXIS
@@ -428,7 +428,7 @@ def _at_equilibrium(satellite, rate, pose, points):
         *((kind, name) for name in pose.own for kind in ("q", "z")),
     )
     for _ in range(NEWTON_STEPS):
-        matrices, rates = jax.device_get(_jacobians()(satellite, rate, pose, points))
+        matrices, rates = jax.device_get(_derivatives(satellite, rate, pose, points))
         unbalance = _against_bus(rows, free, pose, rates)
         if np.all(np.abs(unbalance) < 1e-11):
             break
@@ -458,7 +458,7 @@ def _output_names(satellite, rate, pose, points) -> tuple[str, ...]:
     )
 
 
-@eqx.filter_jit
+@compiled_for_few_runs
 def _moved(pose, steps, own_step):
     """Other poses: displacements and rotation vectors of the bodies, bus axes, and own parts."""
     p, q, own = dict(pose.p_BX_B), dict(pose.q_BX), dict(pose.own)
@@ -486,20 +486,7 @@ def _against_bus(rows: Rows, free: list[str], pose: Pose, values: np.ndarray) ->
     return np.concatenate(found)
 
 
-@functools.cache
-def _jacobians():
-    """``_derivatives``, compiled with little optimisation: it runs once or a few times.
-
-    Compilation takes a fifth of the time; a run takes 2 ms instead of 1.
-    """
-    options = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 0}
-    try:
-        jax.jit(lambda: jnp.zeros(()), compiler_options=options)()
-    except jax.errors.JaxRuntimeError:  # an XLA that does not know them
-        options = {}
-    return eqx.filter_jit(_derivatives, compiler_options=options)  # type: ignore[call-overload]
-
-
+@compiled_for_few_runs
 def _derivatives(satellite, rate, pose, points):
     """A, B, C, D and dx/dt in a pose."""
     averaged = satellite.averaged()
@@ -532,7 +519,7 @@ def platform_inertia(
     return float(mass), center, own
 
 
-@eqx.filter_jit
+@compiled_for_few_runs
 def _carried_mass(satellite, gimbal_angle, name):
     """Mass matrix on the speeds of a body of itself and what it alone carries, its axes."""
     satellite = satellite.averaged()
@@ -559,7 +546,7 @@ def steering_commands(satellite: Satellite, gimbal_angle: np.ndarray | Array) ->
     return commands
 
 
-@eqx.filter_jit
+@compiled_for_few_runs
 def _steering_matrix(satellite, gimbal_angle):
     unit, zero = jnp.array([1.0, 0.0, 0.0, 0.0]), jnp.zeros(())
     state = initial_state(satellite, unit, jnp.zeros(3), gimbal_angle)

@@ -36,6 +36,7 @@ from quietbus.build import build_satellite
 from quietbus.dynamics.rotor_response import orders_of
 from quietbus.dynamics.vibration import Vibration
 from quietbus.dynamics.views import NOTHING_SEEN
+from quietbus.jaxconfig import compiled_for_few_runs
 from quietbus.model.moments import ORDERS
 from quietbus.model.satellite import Satellite
 from quietbus.model.variants import with_rotor_speed
@@ -460,7 +461,7 @@ def _compiled_designs(satellites, angles):
     return eqx.filter_vmap(steady_jitter)(satellites, jnp.asarray(angles))
 
 
-@eqx.filter_jit
+@compiled_for_few_runs
 def _compiled_derivative(satellite, ways, gimbal_angle, output):
     arrays, rest = eqx.partition(satellite, eqx.is_array)
 

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -16,6 +15,7 @@ from quietbus.dynamics.invariants import (
     linear_momentum_N,
 )
 from quietbus.dynamics.state import State
+from quietbus.jaxconfig import compiled_for_few_runs
 from quietbus.model.body import body_quantities
 from quietbus.model.disturbance import quiet_rotors
 from quietbus.model.satellite import BUS, Satellite
@@ -167,6 +167,6 @@ def over_time(
     return np.asarray(_over_time(quantity, satellite, jnp.asarray(times), states))
 
 
-@eqx.filter_jit
+@compiled_for_few_runs
 def _over_time(quantity, satellite, times, states):
     return jax.vmap(lambda t, state: quantity(satellite, t, state))(times, states)

@@ -3,15 +3,15 @@
 from dataclasses import replace
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from quietbus.analysis.jitter.lines import AT_REST, rest_error, steady_jitter
+from quietbus.analysis.jitter.lines import AT_REST, rest_error, steady_jitter_once
 from quietbus.dynamics.rotor_response import orders_of
 from quietbus.dynamics.state import State
 from quietbus.dynamics.vibration import Vibration
+from quietbus.jaxconfig import compiled_for_few_runs
 from quietbus.model.body import body_quantities
 from quietbus.model.gimbal_motor import SmoothMotor
 from quietbus.model.rotors import RunUp
@@ -144,7 +144,7 @@ def _in_time(
     return np.sum((amplitude * turned[..., None]).real, axis=(1, 2))
 
 
-@eqx.filter_jit
+@compiled_for_few_runs
 def _rotor_angles(satellite, times, states):
     def at(t, state):
         return jnp.concatenate([c.at(t, state.own).rotor.angle for c in satellite.clusters])
@@ -160,13 +160,8 @@ def _size(amplitude: np.ndarray) -> float:
 def _jitter(subject: Subject) -> tuple[dict[str, np.ndarray], Vibration]:
     """Amplitudes (cmg, order, ...) at rest, and the equations that they solve."""
     angle = jnp.asarray(subject.reference.mechanism.units.gimbal_angle)
-    amplitudes, small = _compiled_jitter(subject.satellite, angle)
+    amplitudes, small = steady_jitter_once(subject.satellite, angle)
     return {name: np.asarray(each) for name, each in amplitudes.items()}, small
-
-
-@eqx.filter_jit
-def _compiled_jitter(satellite, gimbal_angle):
-    return steady_jitter(satellite, gimbal_angle)
 
 
 def _rest(data: dict[str, Any]) -> None:

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -11,6 +10,7 @@ from jaxtyping import Array
 from quietbus.dynamics.closed_loop import evaluate, state_rate
 from quietbus.dynamics.outputs import outputs
 from quietbus.dynamics.rotor_response import orders_of
+from quietbus.jaxconfig import compiled_for_few_runs
 from quietbus.model.satellite import CONTROL, Satellite
 from quietbus.reference.motion import Motion
 from quietbus.reference.satellite import Instant
@@ -98,7 +98,7 @@ def _rounding(subject: Subject) -> float:
     return 4e-15 * float(fastest)
 
 
-@eqx.filter_jit
+@compiled_for_few_runs
 def _evaluated(satellite, times, states):
     """Accelerations, decisions, what is reported, joint forces: by name, (n, ...)."""
     legs = holding_legs(satellite)

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import fields
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -16,6 +15,7 @@ from jaxtyping import Array, Float
 from quietbus.dynamics.closed_loop import attitudes
 from quietbus.dynamics.equations import moving, rates_of
 from quietbus.dynamics.state import BodyState, State
+from quietbus.jaxconfig import compiled_for_few_runs
 from quietbus.model.cluster import Cluster, Units
 from quietbus.model.element import Own, Rates
 from quietbus.model.satellite import BUS, CONTROL, Satellite
@@ -123,7 +123,7 @@ def motion_of(satellite: Satellite, t: float | Float[Array, ""], state: State) -
     return Motion(**{name: np.array(value) for name, value in found.items()})
 
 
-@eqx.filter_jit
+@compiled_for_few_runs
 def _motion(satellite: Satellite, t: Float[Array, ""], state: State) -> dict[str, Array]:
     motions = moving(satellite, t, state).motions
     bodies, turned = [motions[body.name] for body in satellite.bodies], attitudes(satellite, state)

@@ -19,6 +19,7 @@ from quietbus.analysis.jitter.lines import at_rest, for_designs
 from quietbus.dynamics.coefficients import SlowMotion, coefficients
 from quietbus.dynamics.rotor_response import orders_of, rotor_forces, rotor_speeds
 from quietbus.dynamics.vibration import Vibration, vibration
+from quietbus.jaxconfig import compiled_for_few_runs
 from quietbus.model.satellite import BUS, Satellite
 from quietbus.model.variants import with_mount
 
@@ -175,7 +176,7 @@ def platform_at_rest(satellite: Satellite, gimbal_angle: np.ndarray) -> HeldPlat
     return _compiled_platform(satellite, jnp.asarray(gimbal_angle))
 
 
-@eqx.filter_jit
+@compiled_for_few_runs
 def _compiled_platform(satellite, gimbal_angle):
     _, averaged, slow = at_rest(with_mount(satellite, False), gimbal_angle)
     return held_platform(averaged, slow)

@@ -15,6 +15,7 @@ from quietbus.dynamics.coefficients import SlowMotion, slow_motion
 from quietbus.dynamics.rotor_response import orders_of, rotor_response, rotor_speeds
 from quietbus.dynamics.vibration import Vibration, vibration
 from quietbus.dynamics.views import NOTHING_SEEN, View, linear_outputs
+from quietbus.jaxconfig import compiled_for_few_runs
 from quietbus.model import variants
 from quietbus.model.cluster import Cluster
 from quietbus.model.satellite import Satellite
@@ -51,6 +52,9 @@ def steady_jitter(
     s = 1j * rotor_speeds(satellite, small)[:, None] * jnp.array(orders_of(satellite))
     outputs = jax.vmap(jax.vmap(lambda s, x: linear_outputs(satellite, small, s, x, view)))
     return outputs(s, xi), small
+
+
+steady_jitter_once = compiled_for_few_runs(steady_jitter)
 
 
 def rest_error(small: Vibration) -> float:

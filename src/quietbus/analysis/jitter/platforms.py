@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -15,7 +14,7 @@ import numpy as np
 from quietbus.analysis.control.controlled import ControlledSatellite, controlled
 from quietbus.analysis.control.modes import RIGID_BODY
 from quietbus.analysis.control.pid import PID
-from quietbus.analysis.jitter.lines import at_rest, rest_error, steady_jitter
+from quietbus.analysis.jitter.lines import at_rest, rest_error, steady_jitter_once
 from quietbus.dynamics.linearize import (
     Actuation,
     LinearModel,
@@ -25,6 +24,7 @@ from quietbus.dynamics.linearize import (
 )
 from quietbus.dynamics.rotor_response import orders_of
 from quietbus.dynamics.vibration import Vibration, actuator_reactions
+from quietbus.jaxconfig import compiled_for_few_runs
 from quietbus.model.satellite import BUS, Satellite
 from quietbus.model.together import together
 from quietbus.model.variants import with_base_fixed, with_mount
@@ -71,7 +71,7 @@ class Platforms:
     def _at_rest(self) -> dict[str, tuple[dict[str, np.ndarray], Vibration]]:
         found = {}
         for mount in MOUNTS:
-            outputs, small = _compiled(self.mounted(mount), jnp.asarray(self.gimbal_angle))
+            outputs, small = steady_jitter_once(self.mounted(mount), jnp.asarray(self.gimbal_angle))
             found[mount] = jax.tree.map(np.asarray, (outputs, small))
         return found
 
@@ -161,12 +161,7 @@ class Platforms:
         return found[:, 0], found[:, 1]
 
 
-@eqx.filter_jit
-def _compiled(satellite, gimbal_angle):
-    return steady_jitter(satellite, gimbal_angle)
-
-
-@eqx.filter_jit
+@compiled_for_few_runs
 def _compiled_reaction(satellite, gimbal_angle):
     _, averaged, slow = at_rest(satellite, gimbal_angle)
     return actuator_reactions(averaged, slow)
