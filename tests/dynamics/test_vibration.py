@@ -15,7 +15,7 @@ from quietbus.dynamics.coefficients import coefficients, slow_motion
 from quietbus.dynamics.equations import balance, mass_matrix
 from quietbus.dynamics.equations import moving as all_motions
 from quietbus.dynamics.linearize import OperatingPoint, linearize
-from quietbus.dynamics.views import View, linear_outputs
+from quietbus.dynamics.views import View, linear_outputs_with
 from quietbus.model.moments import ClusterMoments, Turning
 from quietbus.model.motion import Motion
 from quietbus.spatial.rotation import rotation_vector_to_matrix
@@ -145,7 +145,8 @@ def test_each_motion_moves_the_image_by_its_own_column(moving):
     small = SimpleNamespace(slow=slow, turning=jnp.zeros((3, 3)), seen={})
     small.projection, small.speed = np.eye(12), np.zeros((12, 12))
     view = View(jnp.zeros((0, 3)), jnp.eye(12).reshape(4, 3, 12))
-    see = lambda xi: linear_outputs(averaged, small, 1j, jnp.array(xi), view)  # noqa: E731
+    nothing = lambda: jnp.zeros(0)  # noqa: E731
+    see = lambda xi: linear_outputs_with(averaged, small, 1j, jnp.array(xi), view, nothing)  # noqa: E731
     r, theta = np.random.default_rng(3).normal(size=(2, 3)) + 0j
     arm = slow.now.motions["plate"].p
     as_one = np.concatenate([r, theta, r + np.cross(theta, arm), theta])

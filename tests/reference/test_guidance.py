@@ -34,7 +34,7 @@ def test_attitude_rate_and_acceleration_are_those_that_quietbus_plans(limits):
     changes = {f"target.guidance.{name}": x for name, x in zip(names, limits, strict=True)}
     scenario = awkward_scenario().with_overrides(changes | {"target.guidance.start": 0.7})
     theirs = Guidance(scenario.to_dict())
-    ours = build_satellite(scenario).guidance
+    ours = build_satellite(scenario).control.guidance
     times = np.random.default_rng(1).uniform(0.0, 1.2 * theirs.turn.x[-1], 50)
     found = jax.vmap(ours.reference)(times)
     for i, t in enumerate(times):

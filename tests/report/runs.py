@@ -56,7 +56,10 @@ def synthetic(
         "wall_time_s": 12.345,
         "created": "2012-03-04T05:06:07+00:00",
     }
-    for name in ("bus_attitude", "attitude_error", "bus_rate"):
+    turned = 2.0 * np.pi * ROTOR * time[:, None] * np.ones(cmgs)
+    data["rotor_speed"] = (("time", "cmg"), np.full((count, cmgs), 2.0 * np.pi * ROTOR))
+    data["rotor_angle"] = (("time", "cmg"), turned)
+    for name in ("bus_attitude", "attitude_error", "bus_rate", "rotor_speed", "rotor_angle"):
         data[name] += ({"units": VARIABLES[name][1], "long_name": VARIABLES[name][2]},)
     data["platform_attitude"] = data["bus_attitude"]
     labels = {name: values for name, (_, values, _) in DIMENSIONS.items()}
