@@ -206,12 +206,12 @@ class Cluster(AbstractActuator):
         """Gimbals turn their rotors' momentum, wheels push against their rotors."""
         units = self.turning(around.t, around.own, jnp.zeros(self.driven))
         R_PG = eqx.filter_vmap(ControlMomentGyro.R_PG)(self.units, units.gimbal.angle)
-        R_AG = around.hosts[0].R_AX @ R_PG
         momentum = self.units.I_RRcm_R[:, 0, 0] * units.rotor.rate
-        by_rate = (momentum[:, None] * R_AG[:, :, 1]).T[:, : self.cut]  # h t
+        by_rate = (momentum[:, None] * R_PG[:, :, 1]).T[:, : self.cut]  # h t
         rates, torques = self.gimbals.full(self.count), self.rotors.full
         full = jnp.concatenate([rates, torques])
-        torque_A = -jnp.concatenate([by_rate * rates, self.rotors.axes_A(R_AG) * torques], axis=1)
+        torque_P = -jnp.concatenate([by_rate * rates, self.rotors.axes(R_PG) * torques], axis=1)
+        torque_A = rotate(around.hosts[0].R_AX, torque_P.T).T
         rms = jnp.sqrt(3.0 * jnp.mean(torque_A**2)) if self.driven else jnp.ones(())
         rms = jnp.where(rms > 0.0, rms, 1.0)  # where no rotor turns
         return Authority(torque_A / rms, rms, full)

@@ -18,6 +18,7 @@ from quietbus.spatial.rotation import (
     quaternion_multiply,
     quaternion_to_matrix,
 )
+from quietbus.spatial.vector import rotate
 
 TORQUE = Quantity("control_torque", AXIS, "N m", "commanded torque on the bus, bus frame")
 ERROR = Quantity(
@@ -145,7 +146,8 @@ class Control(eqx.Module):
         torque_share = jnp.ones(())
         if self.acts:
             R = actuators.arounds[0].hosts[0].R_AX  # laws have the axes of the first carrier
-            shares = self.steering.rates(R.T @ axes, R.T @ torque / actuators.torque, t)
+            axes_A = rotate(R.T, axes.T).T
+            shares = self.steering.rates(axes_A, R.T @ torque / actuators.torque, t)
             wanted = actuators.split(shares)
             share = actuators.share(wanted)
             within = tuple(share * each for each in wanted)

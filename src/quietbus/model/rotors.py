@@ -44,8 +44,8 @@ class AbstractRotors(eqx.Module):
         """Whether speeds are the same at all times."""
         return False
 
-    def axes_A(self, R_AG: Float[Array, "cmg 3 3"]) -> Float[Array, "3 y"]:
-        """What they drive: axes of the torques on their rotors."""
+    def axes(self, R_PG: Float[Array, "cmg 3 3"]) -> Float[Array, "3 y"]:
+        """What they drive: axes of the torques on their rotors, in the frame P of the plate."""
         return jnp.zeros((3, 0))
 
     @property
@@ -140,8 +140,8 @@ class WheelMotors(AbstractRotors):
     def turning(self, units, t, y, y_rate, y_second):
         return Turning(y, y_rate, y_second)
 
-    def axes_A(self, R_AG):
-        return R_AG[:, :, 0].T
+    def axes(self, R_PG):
+        return R_PG[:, :, 0].T
 
     @property
     def full(self):
