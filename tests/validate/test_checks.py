@@ -33,6 +33,16 @@ def test_awkward_satellites_agree_with_the_reference(make):
     assert not _failed(Subject(make(), make()))
 
 
+def test_an_imbalance_of_less_than_a_micrometre_is_not_lost():
+    """MuJoCo takes such a mass centre as on the axis, if it is let."""
+    rotor = {"static_imbalance": 2e-6, "dynamic_imbalance": 0.0}
+    small = load_scenario("zhang2012").with_overrides(
+        {f"cluster.rotor.{key}": value for key, value in rotor.items()}
+        | {"initial.attitude": [0, 0, 0]}
+    )
+    assert not _failed(Subject(small, small))
+
+
 @pytest.mark.parametrize(
     ("path", "value", "seen_by"),
     [

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from quietbus.reference.engine import import_mujoco
+from quietbus.reference.engine import import_mujoco, model_of
 from quietbus.reference.mechanism import Mechanism
 from quietbus.reference.mjcf import (
     LEG_JOINTS,
@@ -55,9 +55,7 @@ class Multibody:
         """Build the model; ``motion`` only has to be a possible one."""
         self._mujoco = mujoco = import_mujoco()
         self.mechanism = mechanism
-        self._model = model = mujoco.MjModel.from_xml_string(
-            write_mjcf(mechanism, motion, legs="bodies")
-        )
+        self._model = model = model_of(write_mjcf(mechanism, motion, legs="bodies"))
         model.dof_armature[:] = 0.0  # servos are constraints here
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
         self._data = mujoco.MjData(model)

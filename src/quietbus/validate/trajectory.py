@@ -33,7 +33,7 @@ from quietbus.model.variants import (
     without_leg_mass,
     without_rotation,
 )
-from quietbus.reference.engine import import_mujoco
+from quietbus.reference.engine import import_mujoco, model_of
 from quietbus.reference.mechanism import Mechanism
 from quietbus.reference.mjcf import ARMATURE
 from quietbus.reference.motion import Motion
@@ -170,7 +170,7 @@ def fly_mujoco(
     mujoco = import_mujoco()
     steps = int(np.ceil((times[1] - times[0]) / timestep - 1e-9))
     xml = write_mjcf(satellite, state, "tendons", (times[1] - times[0]) / steps, times[0])
-    model = mujoco.MjModel.from_xml_string(xml)
+    model = model_of(xml)
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, model.key("start").id)
     mechanism = mechanism_of(satellite)
