@@ -1,5 +1,6 @@
 """Parts of a user's own: docs/extending.md, done as it says."""
 
+import json
 import re
 import subprocess
 import sys
@@ -73,12 +74,53 @@ def test_command_of_the_page_runs_with_both_parts(folder):
     assert "actuators.rods.type" in without.stderr
 
 
+def test_a_run_is_not_continued_with_another_law(folder):
+    """The scenario is the same to the letter; the file of its strut is not."""
+    law = folder / "law.py"
+    law.write_text((folder / "own_parts.py").read_text())
+    ask = ("-c", _ASK.format(law="law.py"))
+    assert _run(folder, *ask, "first").strip() == "new"
+    assert _run(folder, *ask, "again").strip() == "goes on"
+    law.write_text(law.read_text().replace("self.k_A * e +", "3.0 * self.k_A * e +"))
+    assert "differs in parts_file" in _run(folder, *ask, "again")
+
+
+_ASK = """
+import pathlib, sys
+from quietbus.cli.own_parts import load_parts
+load_parts(pathlib.Path("{law}"))
+import quietbus as qb
+from quietbus.asked import task_asked
+from quietbus.results.checkpoint import Checkpoint, CheckpointError
+task = task_asked(qb.load_scenario("my.yaml"), qb.Direct())
+try:
+    if sys.argv[1] == "first":
+        Checkpoint.create("run.checkpoint", task).close()
+        print("new")
+    else:
+        Checkpoint.resume("run.checkpoint", task)[0].close()
+        print("goes on")
+except CheckpointError as error:
+    print(error)
+"""
+
+
+def test_a_file_of_parts_may_be_called_as_a_library_is(folder):
+    """And an analysis says what it does not have of the strut's memory."""
+    (folder / "elsewhere").mkdir()
+    file = folder / "elsewhere" / "json.py"
+    file.write_text((folder / "own_parts.py").read_text())
+    told = _run(folder, "-m", "quietbus", "--parts", str(file), "analyze", "my.yaml", "--json")
+    assert any("struts have memory" in note for note in json.loads(told)["notes"])
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
         (None, "expected a Python file"),
         ("import nothing_of_this_name\n", "line 1: ModuleNotFoundError"),
         ("\nx = (\n", "line 2: SyntaxError"),
+        ("raise SystemExit(3)\n", "line 1: SystemExit: 3"),
     ],
 )
 def test_a_file_of_parts_that_cannot_be_used_is_told(folder, text, said):

@@ -174,7 +174,7 @@ def worst_over_phases(run: xr.Dataset) -> np.ndarray | None:
         return summarize(run).worst_phases_rate
     last = run.isel(time=-1)
     angles, speed = (last[name].to_numpy() for name in ("gimbal_angle", "rotor_speed"))
-    return worst_phases_at_rest(scenario, run.attrs["mount"], angles, speed)
+    return worst_phases_at_rest(scenario, angles, speed)
 
 
 def analyze(scenario: Scenario | str, gimbal_angle: ArrayLike | None = None) -> Study:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from quietbus.arguments import array, choice, positive, vector
 from quietbus.methods import Method
 from quietbus.processes import start_computing
-from quietbus.results.task import Task
+from quietbus.results.task import Task, parts_file_of
 from quietbus.scenario import LineOfSight, Scenario, load_scenario
 from quietbus.scenario.plausibility import implausible
 from quietbus.studies.resolution import refuse_coarse_output
@@ -42,18 +42,17 @@ def scenario_asked(
     found = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     start_computing()
     wanted = {
-        "isolator.mount": mount,
         "simulation.duration": duration,
         "simulation.output_rate": output_rate,
     }
     changes = {path: _checked(path, value) for path, value in wanted.items() if value is not None}
+    if mount is not None:
+        found = found.with_mount(choice("mount", mount, ("isolated", "rigid")))
     return found.with_overrides(changes) if changes else found
 
 
 def _checked(path: str, value: Any) -> Any:
     name = path.rpartition(".")[2]
-    if name == "mount":
-        return choice(name, value, ("isolated", "rigid"))
     return value if isinstance(value, str) else positive(name, value)  # a text may have a unit
 
 
@@ -91,14 +90,14 @@ def task_asked(
         if points or lines_of_sight:
             raise ValueError("points and lines_of_sight need method 'harmonic'")
         refuse_coarse_output(scenario)
-        return Task(scenario, method, joint_forces)
+        return Task(scenario, method, joint_forces, parts_file=parts_file_of(scenario))
     at = {name: vector(f"points[{name!r}]", p, 3) for name, p in points.items()}
     own = {name: scenario.sight(name).matrix() for name in scenario.lines_of_sight}
     lines = {
         name: _sensitivity(f"lines_of_sight[{name!r}]", each)
         for name, each in (own | dict(lines_of_sight)).items()
     }
-    return Task(scenario, method, points=at, lines_of_sight=lines)
+    return Task(scenario, method, False, at, lines, parts_file_of(scenario))
 
 
 def _sensitivity(name: str, given: ArrayLike) -> np.ndarray:

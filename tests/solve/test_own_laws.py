@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from oracles.satellites import awkward_satellite, paper_satellite, uncontrolled, with_units
+from quietbus.analysis.control.modes import fixed_base_modes
 from quietbus.dynamics.closed_loop import initial_state, state_rate
 from quietbus.dynamics.invariants import (
     angular_momentum_N,
@@ -19,7 +20,7 @@ from quietbus.dynamics.invariants import (
     kinetic_energy,
     linear_momentum_N,
 )
-from quietbus.dynamics.linearize import OperatingPoint, linearize
+from quietbus.dynamics.linearize import OperatingPoint, linearize, platform_inertia
 from quietbus.dynamics.views import NOTHING_SEEN
 from quietbus.extend import AbstractElement, Output, Own, Quantity
 from quietbus.model.element import Energy, RigidParts
@@ -30,7 +31,7 @@ from quietbus.solve.harmonic import integrate_harmonic
 from quietbus.spatial.rotation import skew
 from quietbus.spatial.vector import cross
 from quietbus.validate.states import kicked_state
-from quietbus.validate.trajectory import fly
+from quietbus.validate.trajectory import fly, massless_legs
 
 PAGE = Path(__file__).parents[2] / "docs" / "extending.md"
 REST = OperatingPoint(np.zeros(3), np.zeros(4))
@@ -127,6 +128,19 @@ def test_linear_strut_with_memory_has_its_closed_form_stiffness(strut_law, make)
         s = 2j * np.pi * hz[:, None]
         expected = K_A + K_B * C * s / (K_B + C * s)
         assert np.max(np.abs(force / stroke / expected - 1.0)) < 1e-9
+
+
+def test_modes_on_a_fixed_base_have_the_memory(strut_law):
+    """Along z six struts of the paper count twice: m s^2 + 2 Z(s) = 0 with Z dynamic."""
+    satellite = massless_legs(paper_satellite(imbalance=0.0))
+    satellite = with_base_fixed(with_memory(satellite, strut_law))
+    mass, _, _ = platform_inertia(satellite, np.zeros(4), "plate")
+    lowest = fixed_base_modes(linearize(satellite, REST, "ideal"))
+    found = [mode.pole for mode in lowest if mode.name == "translation z" and mode.pole.imag > 0.0]
+    series = K_B / C  # rate of the memory: Z = k_A + k_B s / (s + series)
+    roots = np.roots([mass, mass * series, 2.0 * (K_A + K_B), 2.0 * K_A * series])
+    expected = roots[roots.imag > 0.0]
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
 def test_harmonic_strut_with_memory_has_its_closed_form_stiffness(strut_law):

@@ -99,7 +99,6 @@ def load(
 
     angles = gimbal_angles and [angle.strip() for angle in gimbal_angles.split(",")]
     given = {
-        "isolator.mount": ("--mount", mount and mount.value),
         "simulation.duration": ("--duration", duration),
         "simulation.output_rate": ("--output-rate", output_rate),
         "cluster.gimbal_angles": ("--gimbal-angles", angles),
@@ -109,6 +108,8 @@ def load(
     Asked.file, Asked.names = name, (scenario.name, f"{scenario.name} with overrides")
     Asked.options = {path: option for path, (option, _) in given.items()}
     scenario = scenario.with_overrides({path: value for path, (_, value) in given.items()})
+    if mount is not None:
+        scenario = scenario.with_mount(mount.value)
     for note in implausible(scenario):
         print(f"note: {note}", file=sys.stderr)
     return scenario

@@ -17,14 +17,15 @@ def load_parts(file: Path) -> None:
     """
     if file.suffix != ".py" or not file.is_file():
         raise BadInput(f"--parts {file}: expected a Python file (.py), got none of that name")
-    spec = importlib.util.spec_from_file_location(file.stem, file)
+    name = f"parts of {file.stem}"  # no library's, whatever the file is called
+    spec = importlib.util.spec_from_file_location(name, file)
     assert spec is not None  # of a .py file there is one
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.modules[file.stem] = module
+    sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         line = _line(error, file)
         where = f"{file}, line {line}" if line else str(file)
         raise BadInput(f"--parts {where}: {type(error).__name__}: {error}") from None

@@ -9,6 +9,7 @@ import numpy as np
 from quietbus.plots.layout import Layout
 from quietbus.plots.style import COLOURS, new_figure
 from quietbus.scenario import Scenario
+from quietbus.scenario.struts import StrutKind
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -58,7 +59,7 @@ def leg_figure(scenario: Scenario, placed: Layout, leg: int = 0) -> Figure:
     axes.text(length, 2.2 * half, "spherical joint", ha="center", va="bottom", fontsize=8)
     axes.text(
         0.5 * length, 5.2 * half,
-        f"k = {own['stiffness']:.6g} N/m, c = {own['damping']:.6g} N s/m",
+        _law(legs.law, leg),
         ha="center", va="bottom", fontsize=9, color=STRUT,
     )  # fmt: skip
     axes.set_xlim(-0.22 * length, 1.22 * length)
@@ -80,6 +81,17 @@ def _alike(legs: Any) -> bool:
     rows = ("upper_joints", "lower_joints", "universal_axes")
     values = [getattr(legs, name) for name in type(legs).model_fields if name not in rows]
     return all(len(set(value)) == 1 for value in values if isinstance(value, tuple))
+
+
+def _law(law: StrutKind, leg: int) -> str:
+    """A strut's law in a line."""
+    if (known := law.spring_and_damper()) is not None:
+        k, c = (each[leg] if isinstance(each, tuple) else each for each in known)
+        return f"k = {k:.6g} N/m, c = {c:.6g} N s/m"
+    numbers = law.model_dump()
+    said = f"strut of type {numbers.pop('type')}"
+    own = (f"{key} {x:g}" if isinstance(x, float) else f"{key} {x}" for key, x in numbers.items())
+    return f"{said}: {', '.join(own)} (SI)"
 
 
 def _part(name: str, part: Any) -> str:

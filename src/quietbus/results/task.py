@@ -1,5 +1,9 @@
 """What is asked of a run: all that its numbers depend on."""
 
+import hashlib
+import os
+import pathlib
+import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Self
@@ -23,6 +27,7 @@ class Task:
     joint_forces: bool = False
     points: Mapping[str, np.ndarray] = field(default_factory=dict)  # (3,) [m] by name
     lines_of_sight: Mapping[str, np.ndarray] = field(default_factory=dict)  # (3, 12) by name
+    parts_file: str = ""  # digest of the files that register the scenario's own kinds of parts
 
     @property
     def tolerances(self) -> Tolerances:
@@ -51,6 +56,7 @@ class Task:
             "joint_forces": self.joint_forces,
             "points": named(self.points),
             "lines_of_sight": named(self.lines_of_sight),
+            "parts_file": self.parts_file,
         }
 
     @classmethod
@@ -63,7 +69,21 @@ class Task:
             data["joint_forces"],
             named(data["points"]),
             named(data["lines_of_sight"]),
+            data.get("parts_file", ""),
         )
+
+
+def parts_file_of(scenario: Scenario) -> str:
+    """Digest of the files of users in which kinds of parts of the scenario are; empty of none."""
+    parts = [*(site.isolator.legs.law for site in scenario.sites), *scenario.actuators.values()]
+    modules = {type(part).__module__ for part in parts}
+    files = {
+        str(getattr(sys.modules.get(name), "__file__", None) or "")
+        for name in modules
+        if name.partition(".")[0] != "quietbus"
+    }
+    texts = [pathlib.Path(file).read_bytes() for file in sorted(files) if os.path.isfile(file)]
+    return hashlib.sha256(b"\0".join(texts)).hexdigest() if texts else ""
 
 
 def differences(one: Task, other: Task) -> list[str]:

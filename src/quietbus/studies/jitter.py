@@ -400,7 +400,6 @@ def worst_case_norm(amplitude: np.ndarray) -> np.ndarray:
 
 def worst_over_phases(
     scenario: Scenario,
-    mount: str,
     gimbal_angle: np.ndarray,
     rotor_speed: np.ndarray,
 ) -> np.ndarray | None:
@@ -412,8 +411,7 @@ def worst_over_phases(
         gimbal_angle: (cmg,) [rad].
         rotor_speed: (cmg,) [rad/s].
     """
-    built = build_satellite(scenario, mount)  # type: ignore[arg-type]
-    satellite = with_rotor_speed(built, jnp.asarray(rotor_speed))
+    satellite = with_rotor_speed(build_satellite(scenario), jnp.asarray(rotor_speed))
     outputs, small = _compute([satellite], gimbal_angle[None])
     small = jax.tree.map(lambda leaf: leaf[0], small)
     if rest_error(small) > AT_REST:

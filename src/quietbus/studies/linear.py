@@ -91,6 +91,19 @@ class Study:
                 "The scenario lets no unit act (steering: none), so that a run feels no control; "
                 "the loop is analysed as if the plate received the torque that is asked for."
             )
+        if self.satellite.hexapods[0].strut.start().size:
+            notes.append(
+                "The struts have memory. Channels, the loops per axis and the rules take them as "
+                "springs that forget nothing, with no damping of the memory: do not rely on those. "
+                "The coupled loop, the modes and the transmissibility have the struts as they are."
+            )
+        if len(self.scenario.sites) > 1:
+            others = ", ".join(site.name for site in self.scenario.sites[1:])
+            notes.append(
+                f"Channels, the loops per axis and the rules are of {self._platform.body} alone, "
+                f"as if there were no {others}. The coupled loop, the modes and the "
+                "transmissibility have all bodies."
+            )
         if self.channels.largest_coupling > 0.0:
             notes.append(self.channels.verdict)
         return notes

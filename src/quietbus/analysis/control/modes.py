@@ -19,7 +19,7 @@ class Mode:
     damped_frequency_hz: float
     damping: float  # [-] of critical
     pole: complex  # [rad/s], the one with non-negative imaginary part
-    shape: np.ndarray  # (12,) complex: plate position, rotation; bus position, rotation; largest 1
+    shape: np.ndarray  # (12,) complex: the body's position, rotation, the bus's; largest 1
     name: str  # what moves most, and along or about what
 
     def to_dict(self) -> dict[str, object]:
@@ -34,8 +34,8 @@ class Mode:
         }
 
 
-_PLATE = [f"plate_{kind}_{axis}" for kind in ("position", "attitude") for axis in "xyz"]
-_BUS = [f"bus_{kind}_{axis}" for kind in ("position", "attitude") for axis in "xyz"]
+def _pose(body: str) -> list[str]:
+    return [f"{body}_{kind}_{axis}" for kind in ("position", "attitude") for axis in "xyz"]
 
 
 def free_modes(model: LinearModel) -> list[Mode]:
@@ -48,35 +48,44 @@ def free_modes(model: LinearModel) -> list[Mode]:
 
 
 def fixed_base_modes(model: LinearModel) -> list[Mode]:
-    """Modes of the plate with the bus held."""
-    kept = [i for i, name in enumerate(model.states) if name.startswith("plate_")]
+    """Modes of the other bodies, with what struts remember, the bus held."""
+    kept = [i for i, name in enumerate(model.states) if not name.startswith("bus_")]
     states = [model.states[i] for i in kept]
     return _modes(model.A[np.ix_(kept, kept)], states)
 
 
 def _modes(A: np.ndarray, states: list[str]) -> list[Mode]:
-    # the plate's position is relative to the bus's; shapes are shown in space
-    rows = np.zeros((12, len(states)))
-    for i, name in enumerate([*_PLATE, *_BUS]):
-        if name in states:
-            rows[i, states.index(name)] = 1.0
-    for i in range(3):
-        if _BUS[i] in states:
-            rows[i, states.index(_BUS[i])] = 1.0
+    bus = _rows(_pose("bus"), states)
+    first = "_position_x"
+    bodies = [name.removesuffix(first) for name in states if name.endswith(first)]
+    rows = {}
+    for body in bodies:
+        if body != "bus":
+            rows[body] = np.concatenate([_rows(_pose(body), states), bus])
+            rows[body][:3] += bus[:3]  # its position is relative to the bus's; shapes are in space
     poles, vectors = np.linalg.eig(A)
     found = []
     for pole, vector in zip(poles, vectors.T, strict=True):
         if pole.imag < 0.0 or abs(pole) < RIGID_BODY:
             continue
-        shape = rows @ vector
-        if np.max(np.abs(shape)) == 0.0:
+        shapes = {body: each @ vector for body, each in rows.items()}
+        most = max(shapes, key=lambda body: np.max(np.abs(shapes[body][:6] - shapes[body][6:])))
+        if np.max(np.abs(shapes[most])) == 0.0:
             continue
-        found.append(mode_of(pole, shape))
+        found.append(mode_of(pole, shapes[most], "" if len(rows) == 1 else f"{most}: "))
     return sorted(found, key=lambda mode: mode.frequency_hz)
 
 
-def mode_of(pole: complex, shape: np.ndarray) -> Mode:
-    """The mode of a pole [rad/s] and its shape (12,), in space and of any size but zero."""
+def _rows(names: list[str], states: list[str]) -> np.ndarray:
+    """(name, state) what picks states by name; those that there are not stand still."""
+    return np.array([[float(name == state) for state in states] for name in names])
+
+
+def mode_of(pole: complex, shape: np.ndarray, body: str = "") -> Mode:
+    """The mode of a pole [rad/s] and its shape (12,), in space and of any size but zero.
+
+    ``body`` stands before its name: which of several bodies moves.
+    """
     shape = shape / shape[np.argmax(np.abs(shape))]
     return Mode(
         frequency_hz=float(abs(pole) / (2.0 * np.pi)),
@@ -84,7 +93,7 @@ def mode_of(pole: complex, shape: np.ndarray) -> Mode:
         damping=float(-pole.real / abs(pole)),
         pole=complex(pole),
         shape=shape,
-        name=_name(shape),
+        name=body + _name(shape),
     )
 
 
