@@ -1,6 +1,7 @@
 """Several groups of units, several platforms, a payload: what is read, and what is refused."""
 
 import copy
+import re
 import warnings
 from typing import Literal
 
@@ -9,6 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import quietbus as qb
+from quietbus.asked import scenario_asked
 from quietbus.build import build_initial_state, build_satellite
 from quietbus.model.gimbals import GimbalServos, HeldGimbals
 from quietbus.model.rotors import ConstantSpeed, RunUp, WheelMotors
@@ -16,6 +18,7 @@ from quietbus.model.steering import PseudoInverse
 from quietbus.report import report_page
 from quietbus.scenario import Scenario, ScenarioError, load_scenario
 from quietbus.scenario.actuators import ACTUATORS
+from quietbus.scenario.as_read import as_read
 from quietbus.scenario.base import Part
 from quietbus.scenario.plausibility import implausible
 from quietbus.scenario.text import write_yaml
@@ -115,6 +118,16 @@ def test_random_phases_go_by_the_number_through_all_blocks():
     assert len(set(drawn)) == len(drawn)
 
 
+def test_random_phases_are_shown_as_they_are_on_every_platform():
+    data = two()
+    for platform in data["platforms"]:
+        platform["cluster"] = platform["cluster"] | {"rotor_phases": "random"}
+    scenario = Scenario.from_dict(data)
+    shown = [text for name, text in as_read(scenario) if name == "rotor phases"]
+    told = [float(x) for text in shown for x in re.findall(r"-?\d+\.?\d*", text)]
+    np.testing.assert_allclose(told, np.degrees(scenario.units.phases()), rtol=1e-3)
+
+
 def test_a_block_may_run_up_while_others_are_steered():
     data = mixed()
     data["cluster"][1]["run_up"] = {"duration": "3 s"}
@@ -182,6 +195,32 @@ def test_mounts_may_differ():
     scenario = Scenario.from_dict(data)
     assert scenario.mount == "mixed"
     assert build_satellite(scenario).free == ("bus", "north")
+
+
+@pytest.mark.parametrize("kind", [two, payload])
+@pytest.mark.parametrize("mount", ["isolated", "rigid"])
+def test_a_mount_that_is_asked_for_is_that_of_all_bodies(kind, mount):
+    asked = scenario_asked(Scenario.from_dict(kind()), mount)
+    assert asked.mount == mount
+    assert {m.welded for m in build_satellite(asked).mounts} == {mount == "rigid"}
+
+
+@pytest.mark.slow
+def test_a_payload_is_compared_on_both_mounts():
+    runs = qb.compare(Scenario.from_dict(payload() | {"simulation": {"duration": 0.05}}))
+    assert {mount: run.attrs["mount"] for mount, run in runs.items()} == {
+        "isolated": "isolated",
+        "rigid": "rigid",
+    }
+    assert all(np.all(qb.worst_over_phases(run) > 0.0) for run in runs.values())
+
+
+def test_what_an_analysis_leaves_out_of_several_bodies_is_said():
+    study = qb.analyze(Scenario.from_dict(two()))
+    assert any("are of" in note and "alone" in note for note in study.notes)
+    bodies = {mode.name.partition(":")[0] for mode in study.modes["fixed_base"]}
+    assert bodies == {site.name for site in study.scenario.sites}
+    assert len(study.modes["fixed_base"]) == 12
 
 
 def test_a_payload_is_a_body_with_legs_and_without_units():

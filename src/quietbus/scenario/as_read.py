@@ -18,6 +18,7 @@ def as_read(scenario: Scenario) -> list[tuple[str, str]]:
     """Names of parts, each with its main values as text."""
     bus, many = scenario.bus, len(scenario.sites) > 1
     rows = [("bus", f"{plain(bus.mass)} kg, inertia {_each(np.diag(bus.inertia))} kg m^2")]
+    first = 0
     for site in scenario.sites:
         isolator = site.isolator
         base = "" if site.on == BUS else f" on {site.on}"
@@ -29,7 +30,6 @@ def as_read(scenario: Scenario) -> list[tuple[str, str]]:
             ),
             ("struts", f"{isolator.legs.count} of {_struts(isolator.legs)}"),
         ]
-        first = 0
         for block in site.blocks:
             rows += _units(block, first)
             first += block.count
