@@ -9,12 +9,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from quietbus.build.arrays import array, limit
-from quietbus.build.disturbance import Block, disturbance_of, motor_of
+from quietbus.build.disturbance import disturbance_of, motor_of
 from quietbus.model.cluster import Cluster as Units
 from quietbus.model.gimbal_motor import SmoothMotor
 from quietbus.model.gimbals import GimbalServos, HeldGimbals
 from quietbus.model.rotors import AbstractRotors, ConstantSpeed, RunUp, WheelMotors
 from quietbus.model.unit import ControlMomentGyro
+from quietbus.scenario.blocks import Block
 from quietbus.scenario.hardware import Cluster, Unit
 from quietbus.scenario.wheels import Wheel, WheelCluster
 
@@ -47,13 +48,8 @@ def _(block: Cluster, name: str, carrier: str, first_unit: int) -> Units:
 def _(block: WheelCluster, name: str, carrier: str, first_unit: int) -> Units:
     rotors = _run_up(block) if block.run_up else _wheel_motors(block)
     units, disturbance = _units(block, first_unit), disturbance_of(block, first_unit)
-    held = HeldGimbals(array(gimbal_angles(block)))
+    held = HeldGimbals(array(np.zeros(block.count)))
     return Units(name, (carrier,), units, held, rotors, disturbance, SmoothMotor())
-
-
-def gimbal_angles(block: Block) -> np.ndarray:
-    """Angles of the gimbals at the start [rad], zero of those that have none."""
-    return np.array(block.gimbal_angles or np.zeros(block.count))
 
 
 def _units(block: Block, first_unit: int) -> ControlMomentGyro:

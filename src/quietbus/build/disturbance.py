@@ -13,11 +13,10 @@ from quietbus.model.disturbance import (
 )
 from quietbus.model.gimbal_motor import AbstractGimbalMotor, GimbalMotor, SmoothMotor
 from quietbus.scenario import disturbance as said
+from quietbus.scenario.blocks import Block
 from quietbus.scenario.disturbance import COMPONENTS
 from quietbus.scenario.hardware import Cluster, Unit
-from quietbus.scenario.wheels import Wheel, WheelCluster
-
-Block = Cluster | WheelCluster
+from quietbus.scenario.wheels import Wheel
 
 
 def disturbance_of(block: Block, first_unit: int) -> AbstractDisturbance:

@@ -9,7 +9,7 @@ import numpy as np
 
 from quietbus.build.actuators import actuator_of
 from quietbus.build.arrays import array, quaternion, rotation
-from quietbus.build.cluster import cluster_of, gimbal_angles
+from quietbus.build.cluster import cluster_of
 from quietbus.build.control import controller_of, guidance_of, steering_of
 from quietbus.build.legs import legs_of
 from quietbus.build.loads import load_of
@@ -48,13 +48,14 @@ def build_satellite(
     hexapods: list[Hexapod] = []
     clusters: list[Cluster] = []
     alone = len(scenario.sites) == 1
+    mounts = tuple(_mount(site, mount) for site in from_the_bus(scenario.sites))
+    welded = {each.body: each.welded for each in mounts}
     for site in scenario.sites:
-        welded = (mount or site.isolator.mount) == "rigid"
         plate = site.plate
         numbers = (plate.mass, plate.center_of_mass, plate.inertia)
         bodies.append(Body(site.name, *map(array, numbers)))
         legs = "legs" if alone else f"{site.name} legs"
-        hexapods.append(legs_of(site.isolator, legs, (site.name, site.on), not welded))
+        hexapods.append(legs_of(site.isolator, legs, (site.name, site.on), not welded[site.name]))
         for k, block in enumerate(site.blocks):
             name = "cluster" if alone else f"{site.name} cluster"
             name = name if len(site.blocks) == 1 else f"{name} {k}"
@@ -72,7 +73,7 @@ def build_satellite(
     )
     satellite = Satellite(
         tuple(bodies),
-        tuple(_mount(site, mount) for site in from_the_bus(scenario.sites)),
+        mounts,
         tuple(hexapods),
         tuple(clusters),
         (*actuators, *loads),
@@ -80,7 +81,7 @@ def build_satellite(
     )
     if not said:
         return satellite
-    inertia = _whole_inertia(balanced(satellite), array(_angles(scenario)))
+    inertia = _whole_inertia(balanced(satellite), array(scenario.units.gimbal_angles))
     pid = controller_of(said, np.asarray(inertia))
     return dataclasses.replace(satellite, control=dataclasses.replace(control, controller=pid))
 
@@ -91,21 +92,14 @@ def build_initial_state(scenario: Scenario, satellite: Satellite) -> State:
         satellite,
         array(quaternion(rotation(scenario.initial.attitude))),
         array(scenario.initial.rate),
-        array(_angles(scenario)),
+        array(scenario.units.gimbal_angles),
     )
 
 
 def _mount(site: Site, mount: str | None) -> Mount:
     welded = (mount or site.isolator.mount) == "rigid"
-    isolator, base = site.isolator, rotation(site.isolator.orientation)
-    p = isolator.offset + base.apply([0.0, 0.0, isolator.separation])
+    p, base = site.isolator.pose()
     return Mount(site.name, site.on, array(p), array(quaternion(base)), welded)
-
-
-def _angles(scenario: Scenario) -> np.ndarray:
-    """Gimbal angles of all units [rad]."""
-    blocks = [block for site in scenario.sites for block in site.blocks]
-    return np.concatenate([gimbal_angles(block) for block in blocks])
 
 
 @jax.jit

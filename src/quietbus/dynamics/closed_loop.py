@@ -1,7 +1,8 @@
 """The controlled satellite as one ordinary differential equation."""
 
+from collections.abc import Mapping
+
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -46,20 +47,28 @@ def decide(satellite: Satellite, t: Float[Array, ""], state: State) -> Decision:
     """What the attitude control commands, every body being taken in its nominal pose."""
     control, actuators = satellite.control, satellite.actuators
     measured = control.measured(t, state.bus.q_NX, state.bus.w_NX_X)
-    commanded = Actuators(actuators, nominal_arounds(satellite, t, state))
-    return control.decide(t, measured, state.own[CONTROL].z, commanded)
+    obeying = Actuators(actuators, nominal_arounds(satellite, t, state))
+    return control.decide(t, measured, state.own[CONTROL].z, obeying)
 
 
 def drives(satellite: Satellite, now: Moving, decision: Decision) -> dict[str, Rates]:
     """What drives and memories do, by the names of those that have any."""
     commands = dict(zip(satellite.control.actuators, decision.commands, strict=True))
+    rates = commanded(satellite, now, commands)
+    rates[CONTROL] = Rates(now.own[CONTROL].y, decision.memory_rate)
+    return rates
+
+
+def commanded(
+    satellite: Satellite, now: Moving, commands: Mapping[str, Float[Array, " command"]]
+) -> dict[str, Rates]:
+    """What elements do on commands by their names; the others are idle."""
     rates = {}
     for element in satellite.elements:
         if element.name in now.own:
             around = now.around(element)
             idle = jnp.zeros_like(around.own.y)
             rates[element.name] = element.rates(around, commands.get(element.name, idle))
-    rates[CONTROL] = Rates(now.own[CONTROL].y, decision.memory_rate)
     return rates
 
 
@@ -98,14 +107,10 @@ def initial_state(
         gimbal_angle: (cmg,) of the units of all clusters [rad]; of held gimbals it has no effect.
     """
     zero = jnp.zeros(3)
-    own = {e.name: e.start() for e in satellite.elements}
-    first = 0
-    for cluster in satellite.clusters:
-        angles = gimbal_angle[first : first + cluster.count]
-        own[cluster.name] = cluster.with_gimbal_angles(own[cluster.name], angles)
-        first += cluster.count
-    own = {name: each for name, each in own.items() if sum(map(len, jax.tree.leaves(each)))}
-    own[CONTROL] = Own.of(z=satellite.control.controller.start())
+    own = satellite.start()
+    for cluster, mine in satellite.numbered():
+        if cluster.driven:
+            own[cluster.name] = cluster.with_gimbal_angles(own[cluster.name], gimbal_angle[mine])
     bus = BodyState(zero, q_NB, zero, w_NB_B)
     return as_one_body(satellite, State({BUS: bus}, own))
 

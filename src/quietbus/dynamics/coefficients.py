@@ -19,7 +19,6 @@ from quietbus.dynamics.state import State
 from quietbus.model.alike import of_each
 from quietbus.model.element import AbstractElement, Around, Rates
 from quietbus.model.satellite import BUS, Satellite
-from quietbus.spatial.vector import rotate
 
 
 class SlowMotion(eqx.Module):
@@ -34,13 +33,7 @@ class SlowMotion(eqx.Module):
 def slow_motion(averaged: Satellite, t: Float[Array, ""], state: State) -> SlowMotion:
     """The slow motion at time t [s], of ``Satellite.averaged()``."""
     found = evaluate(averaged, t, state)
-    layout, R_BN = found.now.layout, found.now.motions[BUS].R_AX.T
-    turned = [
-        rotate(R_BN, found.u_rate[layout.rows(name)].reshape(2, 3)).reshape(6)
-        for name in layout.names
-    ]
-    own = found.u_rate[6 * len(layout.names) :]
-    u_rate = jnp.concatenate([*turned, own])
+    u_rate = found.now.layout.turned(found.now.motions[BUS].R_AX.T, found.u_rate)
     return SlowMotion(state, found.now.along(BUS), found.rates, u_rate)
 
 

@@ -42,7 +42,7 @@ def _of_cluster(cluster: Cluster, satellite, small, frequency, view):
     layout = small.slow.now.layout
     R_AP = small.slow.now.around(cluster).hosts[0].R_AX
     columns = on_axes(R_AP, inputs).reshape(n * channels, 6).T
-    xi = small.respond(1j * omega, layout.columns([(cluster, columns)])).T
+    xi = small.respond(1j * omega, layout.vector([(cluster, columns)])).T
     seen = jax.vmap(lambda xi: linear_outputs(satellite, small, 1j * omega, xi, view))(xi)
     density = disturbance.density(frequency).reshape(n, channels)
 

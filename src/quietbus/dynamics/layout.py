@@ -14,6 +14,7 @@ from jaxtyping import Array, Float
 from quietbus.dynamics.state import State
 from quietbus.model.element import AbstractElement
 from quietbus.model.satellite import Satellite
+from quietbus.spatial.vector import rotate
 
 BODY = 6  # speeds of a body
 
@@ -71,16 +72,6 @@ class Layout:
         """The rows of a vector that an element is concerned with, in its own order."""
         return jnp.concatenate([u[self.rows(name)] for name, _ in self.of_element(element)])
 
-    def vector(
-        self, shares: Iterable[tuple[AbstractElement, Float[Array, " m"]]]
-    ) -> Float[Array, " n"]:
-        """Sum of the elements' shares."""
-        sums: dict[str, Any] = {name: jnp.zeros(size) for name, size in self.parts}
-        for element, share in shares:
-            for name, part in self._cut(element, share):
-                sums[name] = sums[name] + part
-        return jnp.concatenate(list(sums.values()))
-
     def matrix(
         self, shares: Iterable[tuple[AbstractElement, Float[Array, "m m"]]]
     ) -> Float[Array, "n n"]:
@@ -97,23 +88,28 @@ class Layout:
             ]
         )
 
-    def columns(
-        self, shares: Iterable[tuple[AbstractElement, Float[Array, "m k"]]]
-    ) -> Float[Array, "n k"]:
-        """Sum of the elements' shares, each of the same columns."""
+    def vector(
+        self, shares: Iterable[tuple[AbstractElement, Float[Array, "m ..."]]]
+    ) -> Float[Array, "n ..."]:
+        """Sum of the elements' shares, at least one: vectors, or each of the same columns."""
         sums: dict[str, Any] = {}
-        width = 0
+        width: tuple[int, ...] = ()
         for element, share in shares:
-            width = share.shape[1]
+            width = share.shape[1:]
             for name, part in self._cut(element, share):
                 sums[name] = sums.get(name, 0.0) + part
-        rows = [sums.get(name, jnp.zeros((size, width))) for name, size in self.parts]
+        rows = [sums.get(name, jnp.zeros((size, *width))) for name, size in self.parts]
         return jnp.concatenate(rows)
+
+    def turned(self, R: Float[Array, "3 3"], u: Float[Array, " n"]) -> Float[Array, " n"]:
+        """A vector of all speeds with those of the bodies along other axes."""
+        end = BODY * self.bodies
+        return jnp.concatenate([rotate(R, u[:end].reshape(-1, 3)).reshape(end), u[end:]])
 
     def spread(self, element: AbstractElement, rows: Float[Array, "*k m"]) -> Float[Array, "*k n"]:
         """What depends on the speeds of an element, by those of all; along the last axis."""
         flat = rows.reshape(-1, rows.shape[-1])
-        return self.columns([(element, flat.T)]).T.reshape(*rows.shape[:-1], self.size)
+        return self.vector([(element, flat.T)]).T.reshape(*rows.shape[:-1], self.size)
 
     def _cut(self, element: AbstractElement, share: Array) -> Iterator[tuple[str, Array]]:
         first = 0

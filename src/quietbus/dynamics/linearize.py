@@ -27,7 +27,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from quietbus.dynamics.closed_loop import attitudes, initial_state, nominal_arounds
+from quietbus.dynamics.closed_loop import attitudes, commanded, initial_state, nominal_arounds
 from quietbus.dynamics.equations import Moving, accelerations, moving, rates_of
 from quietbus.dynamics.linear_model import LinearModel
 from quietbus.dynamics.outputs import joined
@@ -169,9 +169,7 @@ def _axes(name: str) -> tuple[str, ...]:
 def state_rows(satellite: Satellite, pose: Pose) -> Rows:
     """The parts of the state."""
     others = [name for name in satellite.free if name != BUS]
-    parts: list[tuple[tuple[str, str], tuple[str, ...]]] = [
-        (("attitude", BUS), _axes("bus_attitude"))
-    ]
+    parts: Parts = [(("attitude", BUS), _axes("bus_attitude"))]
     for name in others:
         parts += [
             (("position", name), _axes(f"{name}_position")),
@@ -209,14 +207,11 @@ def input_rows(satellite: Satellite) -> Rows:
             (("force", body.name), _axes(f"{body.name}_force")),
             (("torque", body.name), _axes(f"{body.name}_torque")),
         ]
-    first = 0
-    for cluster in satellite.clusters:
-        for j in range(first, first + cluster.count):
-            parts += [
-                (("force", f"cmg{j}"), _axes(f"cmg{j}_force")),
-                (("torque", f"cmg{j}"), _axes(f"cmg{j}_torque")),
-            ]
-        first += cluster.count
+    for j in range(satellite.count):
+        parts += [
+            (("force", f"cmg{j}"), _axes(f"cmg{j}_force")),
+            (("torque", f"cmg{j}"), _axes(f"cmg{j}_torque")),
+        ]
     parts.append((("torque", CONTROL), _axes("control_torque")))
     first = 0
     for element in satellite.elements:
@@ -279,12 +274,8 @@ def _system(
     state = _chart(satellite, rate, pose, rows.cut(x))
     now = moving(satellite, jnp.zeros(()), state)
     given = inputs.cut(u)
-    rates = {}
-    for element in satellite.elements:
-        if element.name in now.own:
-            around = now.around(element)
-            command = given.get(("command", element.name), jnp.zeros_like(around.own.y))
-            rates[element.name] = element.rates(around, command)
+    commands = {name: value for (kind, name), value in given.items() if kind == "command"}
+    rates = commanded(satellite, now, commands)
     a = accelerations(satellite, now, rates, _forces(satellite, now, given))
     moved = _rates(satellite, rate, pose, state, now, rates, a)
     outputs = _outputs(satellite, rate, pose, state, now, rates, a, moved, points)
@@ -299,12 +290,9 @@ def _forces(satellite: Satellite, now: Moving, given: Mapping[tuple[str, str], A
         R = now.motions[body.name].R_AX
         both = (R @ given["force", body.name], R @ given["torque", body.name])
         force[body.name] = jnp.concatenate(both)
-    first = 0
-    for cluster in satellite.clusters:
-        around = now.around(cluster)
-        (carrier,) = around.hosts
-        numbers = range(first, first + cluster.count)
-        first += cluster.count
+    for cluster, mine in satellite.numbered():
+        (carrier,) = now.around(cluster).hosts
+        numbers = range(mine.start, mine.stop)
         forces = jnp.stack([given["force", f"cmg{j}"] for j in numbers])
         torques = jnp.stack([given["torque", f"cmg{j}"] for j in numbers])
         angle = cluster.at(now.t, now.own).gimbal.angle

@@ -172,11 +172,11 @@ def _reactions(slow: SlowMotion, answering: Answering, shares):
         element, _ = elements[name]
         u_rate = layout.gathered(element, slow.u_rate)
         each = element.answer(slow.now.around(element), rates_of(slow.rates, element), u_rate)
-        reaction.append(jnp.stack([layout.columns([(element, part)]) for part in each]))
+        reaction.append(jnp.stack([layout.vector([(element, part)]) for part in each]))
     for name, n in answering.z:
         if name in elements:
             element, share = elements[name]
-            push.append(layout.columns([(element, share.by_z)]))
+            push.append(layout.vector([(element, share.by_z)]))
         else:  # of the control, which pushes through its actuators alone
             push.append(jnp.zeros((layout.size, n)))
     return jnp.concatenate(reaction, axis=2), jnp.concatenate(push, axis=1)

@@ -11,7 +11,7 @@ from quietbus.dynamics.equations import moving, rates_of
 from quietbus.dynamics.state import State
 from quietbus.model.body import body_quantities
 from quietbus.model.cluster import ROTOR_TORQUE
-from quietbus.model.report import Output, Quantity
+from quietbus.model.report import Output, Quantity, by_name
 from quietbus.model.satellite import Satellite
 
 Outputs = dict[str, Float[Array, "..."]]
@@ -56,19 +56,14 @@ def told(
         rates, u_rate = rates_of(found.rates, element), now.layout.gathered(element, found.u_rate)
         report += element.report(now.around(element), rates, u_rate, detailed)
     report += satellite.control.report(found.decision)
-    if all(cluster.rotors.steady for cluster in satellite.clusters):
+    if satellite.steady:
         report = [output for output in report if output.quantity != ROTOR_TORQUE]
     return report
 
 
 def joined(report: Iterable[Output]) -> Outputs:
-    """Values by name, those of like parts one after the other."""
-    parts: dict[str, list[Array]] = {}
-    for quantity, value in report:
-        parts.setdefault(quantity.name, []).append(value)
-    return {
-        name: each[0] if len(each) == 1 else jnp.concatenate(each) for name, each in parts.items()
-    }
+    """Values by the names of their quantities."""
+    return by_name((quantity.name, value) for quantity, value in report)
 
 
 def geometry_margin(satellite: Satellite, state: State) -> Float[Array, ""]:

@@ -1,4 +1,4 @@
-"""Steady response to each order of each rotor."""
+"""Steady response to each order of each rotor, and what the outputs tell of it."""
 
 import jax
 import jax.numpy as jnp
@@ -6,6 +6,7 @@ from jaxtyping import Array, Complex, Float
 
 from quietbus.dynamics.equations import rates_of
 from quietbus.dynamics.vibration import Vibration
+from quietbus.dynamics.views import View, linear_outputs
 from quietbus.model.alike import of_each
 from quietbus.model.moments import ORDERS
 from quietbus.model.satellite import Satellite
@@ -45,7 +46,7 @@ def rotor_forces(satellite: Satellite, small: Vibration) -> Complex[Array, "orde
     for cluster, own in zip(satellite.clusters, lines_of, strict=True):
         at = jnp.array([orders.index(h) for h in cluster.disturbance.orders])
         lines = jnp.zeros((len(orders), cluster.count, 6), complex).at[at].set(own)
-        columns = layout.columns([(cluster, lines.reshape(-1, 6).T)])
+        columns = layout.vector([(cluster, lines.reshape(-1, 6).T)])
         parts.append(columns.T.reshape(len(orders), cluster.count, layout.size))
     return jnp.concatenate(parts, axis=1)
 
@@ -75,3 +76,13 @@ def rotor_response(
         return jnp.moveaxis(xi, 2, 0)
     each = jax.vmap(jax.vmap(respond, (None, 0, 0)), (0, None, 0))
     return jnp.swapaxes(each(h, speeds, forces[..., None])[..., 0], 0, 1)
+
+
+def rotor_outputs(
+    satellite: Satellite, small: Vibration, view: View, one_speed: bool = False
+) -> tuple[dict[str, Complex[Array, "cmg order ..."]], Complex[Array, "cmg order m"]]:
+    """Amplitudes of the outputs to each order of each rotor, and the response that they are of."""
+    xi = rotor_response(satellite, small, one_speed)
+    s = 1j * rotor_speeds(satellite, small)[:, None] * jnp.array(orders_of(satellite))
+    each = jax.vmap(jax.vmap(lambda s, x: linear_outputs(satellite, small, s, x, view)))
+    return each(s, xi), xi

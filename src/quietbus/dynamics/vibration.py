@@ -27,6 +27,7 @@ from quietbus.dynamics.memory import Answering, Memory, memory
 from quietbus.dynamics.welds import Welds
 from quietbus.model.element import AbstractElement
 from quietbus.model.motion import Motion
+from quietbus.model.report import by_name
 from quietbus.model.satellite import BUS, Satellite
 from quietbus.spatial.rotation import skew
 from quietbus.spatial.vector import solve_small
@@ -53,9 +54,7 @@ class Vibration(eqx.Module):
     @property
     def turn(self) -> Float[Array, "m m"]:
         """The same of xi of the free bodies."""
-        own = self.free.size - 6 * len(self.free.names)
-        bodies = jnp.kron(jnp.eye(2 * len(self.free.names)), self.turning)
-        return jax.scipy.linalg.block_diag(bodies, jnp.zeros((own, own)))
+        return _of_bodies(self.free, [self.turning] * (2 * len(self.free.names)))
 
     @property
     def rows(self) -> slice:
@@ -124,7 +123,7 @@ def actuator_reactions(averaged: Satellite, slow: SlowMotion) -> Float[Array, "3
     for actuator in averaged.actuators:
         around, rates = slow.now.around(actuator), rates_of(slow.rates, actuator)
         each = actuator.answer(around, rates, layout.gathered(actuator, slow.u_rate))
-        parts.append(jnp.stack([layout.columns([(actuator, part)]) for part in each]))
+        parts.append(jnp.stack([layout.vector([(actuator, part)]) for part in each]))
     return jnp.concatenate(parts, axis=2)
 
 
@@ -175,10 +174,13 @@ def _turning(layout: Layout, motions: dict[str, Motion]):
     V = []
     for name in layout.names:
         V += [W, W - skew(motions[name].w)]
-    own = layout.size - 6 * len(layout.names)
-    none = jnp.zeros((own, own))
-    whole = jax.scipy.linalg.block_diag
-    return whole(*[W] * (2 * len(layout.names)), none), whole(*V, none)
+    return _of_bodies(layout, [W] * len(V)), _of_bodies(layout, V)
+
+
+def _of_bodies(layout: Layout, blocks: list[Array]) -> Float[Array, "n n"]:
+    """A matrix of blocks for the bodies' vectors, with nothing for own speeds."""
+    own = layout.size - 3 * len(blocks)
+    return jax.scipy.linalg.block_diag(*blocks, jnp.zeros((own, own)))
 
 
 def _by_arms(satellite, layout, motions, T, force):
@@ -196,7 +198,7 @@ def _by_arms(satellite, layout, motions, T, force):
 
 def _seen(layout: Layout, answering: Answering, shares: Shares) -> dict[str, Seen]:
     """What the elements tell, those of like parts one after the other."""
-    parts: dict[str, list[Seen]] = {}
+    told = []
     for element, share in shares:
         for name, seen in share.seen.items():
             by_pose, by_speed = (
@@ -208,8 +210,5 @@ def _seen(layout: Layout, answering: Answering, shares: Shares) -> dict[str, See
                 for owner, n in answering.z
             ]
             by_z = jnp.concatenate([jnp.zeros((*shape, 0)), *each_z], axis=-1)
-            parts.setdefault(name, []).append(Seen(by_pose, by_speed, by_z))
-    return {
-        name: each[0] if len(each) == 1 else jax.tree.map(lambda *r: jnp.concatenate(r), *each)
-        for name, each in parts.items()
-    }
+            told.append((name, Seen(by_pose, by_speed, by_z)))
+    return by_name(told)

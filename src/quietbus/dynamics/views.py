@@ -110,9 +110,15 @@ def linear_outputs_with(
     x_B = xi_all[layout.rows(BUS)]
     point = x_B[:3] + cross(x_B[3:], view.point_B)
     found[POINT_ACCELERATION.name] = rotate(turning @ turning, point)
-    lines = [
-        line @ image_motions(motions[on], motions[of], *(xi_all[layout.rows(b)] for b in (on, of)))
-        for line, (on, of) in zip(view.line_of_sight, view.bodies(satellite), strict=True)
-    ]
+    lines = images(satellite, small, view, xi_all)
     found[LINE_OF_SIGHT.name] = jnp.stack(lines) if lines else jnp.zeros((0, 3), xi.dtype)
     return found
+
+
+def images(satellite: Satellite, small: Vibration, view: View, x: Array) -> list[Array]:
+    """Motion of each line's image (3, ...) by x (n, ...), displacements and turns of all bodies."""
+    layout, motions = small.slow.now.layout, small.slow.now.motions
+    return [
+        line @ image_motions(motions[on], motions[of], *(x[layout.rows(b)] for b in (on, of)))
+        for line, (on, of) in zip(view.line_of_sight, view.bodies(satellite), strict=True)
+    ]

@@ -36,22 +36,16 @@ class Welds:
             parts[mount.base] = base + jnp.concatenate([force, torque], axis=-1)
         return jnp.concatenate(list(parts.values()), axis=-1)
 
-    def spread(self, u_rate: Float[Array, " m"], w: bool = True) -> Float[Array, " n"]:
-        """Accelerations of all speeds from those of the free ones.
-
-        Args:
-            w: with the centripetal ones of the bodies' turning.
-        """
+    def spread(self, u_rate: Float[Array, " m"]) -> Float[Array, " n"]:
+        """Accelerations of all speeds from those of the free ones, as the bodies turn."""
         if not self.welded:
             return u_rate
         parts = {name: u_rate[self.free.rows(name)] for name, _ in self.free.parts}
         for mount in self.welded:
             base, r = parts[mount.base], self._arm(mount)
             dv, dw = base[:3], base[3:]
-            dv = dv + cross(dw, r)
-            if w:
-                turning = self.motions[mount.base].w
-                dv = dv + cross(turning, cross(turning, r))
+            turning = self.motions[mount.base].w
+            dv = dv + cross(dw, r) + cross(turning, cross(turning, r))
             parts[mount.body] = jnp.concatenate([dv, dw])
         return jnp.concatenate([parts[name] for name, _ in self.layout.parts])
 

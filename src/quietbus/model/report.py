@@ -4,10 +4,15 @@ The results' variables, the outputs of linear models and of jitter, and the docu
 all read these declarations.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
+import jax
+import jax.numpy as jnp
 from jaxtyping import Array
+
+Value = TypeVar("Value")
 
 AXIS, QUATERNION, UNIT, LEG = ("axis",), ("quaternion",), ("cmg",), ("leg",)
 
@@ -33,3 +38,14 @@ class Output(NamedTuple):
 
 
 Report = tuple[Output, ...]
+
+
+def by_name(told: Iterable[tuple[str, Value]]) -> dict[str, Value]:
+    """Arrays, or trees of them, by name, those of like parts one after the other."""
+    parts: dict[str, list[Value]] = {}
+    for name, value in told:
+        parts.setdefault(name, []).append(value)
+    return {
+        name: each[0] if len(each) == 1 else jax.tree.map(lambda *r: jnp.concatenate(r), *each)
+        for name, each in parts.items()
+    }

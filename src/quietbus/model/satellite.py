@@ -1,8 +1,10 @@
 """The whole satellite as one pytree of parameters."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -10,7 +12,7 @@ from quietbus.model.alike import of_each
 from quietbus.model.body import Body, Mount
 from quietbus.model.cluster import Cluster
 from quietbus.model.control import Control
-from quietbus.model.element import AbstractActuator, AbstractElement
+from quietbus.model.element import AbstractActuator, AbstractElement, Own
 from quietbus.model.legs.hexapod import Hexapod
 from quietbus.model.motion import Motion
 
@@ -48,6 +50,24 @@ class Satellite(eqx.Module):
     def count(self) -> int:
         """Number of CMGs and wheels."""
         return sum(cluster.count for cluster in self.clusters)
+
+    def numbered(self) -> Iterator[tuple[Cluster, slice]]:
+        """The clusters, and where their units are among all."""
+        first = 0
+        for cluster in self.clusters:
+            yield cluster, slice(first, first + cluster.count)
+            first += cluster.count
+
+    @property
+    def steady(self) -> bool:
+        """Whether no rotor changes its speed."""
+        return all(cluster.rotors.steady for cluster in self.clusters)
+
+    def start(self) -> dict[str, Own]:
+        """What elements and control have of their own at the start, of those that have any."""
+        own = {element.name: element.start() for element in self.elements}
+        own = {name: each for name, each in own.items() if sum(map(len, jax.tree.leaves(each)))}
+        return own | {CONTROL: Own.of(z=self.control.controller.start())}
 
     @property
     def rotor_speed(self) -> Float[Array, " cmg"]:

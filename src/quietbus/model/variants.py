@@ -70,11 +70,9 @@ def with_base_fixed(satellite: Satellite, factor: float = 1e12) -> Satellite:
 
 def with_rotor_speed(satellite: Satellite, speed: Float[Array, " cmg"]) -> Satellite:
     """The satellite with other nominal speeds of all rotors [rad/s]."""
-    first, clusters = 0, []
-    for cluster in satellite.clusters:
-        own = speed[first : first + cluster.count]
-        first += cluster.count
-        units = eqx.tree_at(lambda u: u.rotor_speed, cluster.units, own)
+    clusters = []
+    for cluster, own in satellite.numbered():
+        units = eqx.tree_at(lambda u: u.rotor_speed, cluster.units, speed[own])
         clusters.append(replace(cluster, units=units, kept=None))
     return replace(satellite, clusters=tuple(clusters))
 

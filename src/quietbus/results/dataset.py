@@ -63,7 +63,7 @@ def to_dataset(
     }
     if jitter is not None:
         if jitter.ripple is not None:
-            lines = list(_ripple_lines(scenario))
+            lines = list(scenario.units.ripple)
             meaning = "multiple of the gimbal angle"
             coordinates["ripple"] = ("ripple", lines, {"long_name": meaning})
         if jitter.broadband is not None:
@@ -187,7 +187,7 @@ def _jitter_variables(scenario: Scenario, solution: Solution, jitter: Jitter) ->
 
 def _turning_gimbals(scenario: Scenario, outputs: Outputs) -> tuple[np.ndarray, np.ndarray]:
     """Frequency [rad/s] and phase [rad] of each line (n, line) of the gimbal motors."""
-    multiples = np.array(_ripple_lines(scenario))
+    multiples = np.array(scenario.units.ripple)
     gimbals = (np.asarray(outputs[name]) for name in ("gimbal_rate", "gimbal_angle"))
     rate, angle = ((values[..., None] * multiples).reshape(len(values), -1) for values in gimbals)
     return rate, angle
@@ -209,11 +209,6 @@ def _ripple_variables(
             f"{of} by gimbal motors: phase against ripple times gimbal angle",
         ),
     }
-
-
-def _ripple_lines(scenario: Scenario) -> tuple[float, ...]:
-    """Multiples of the gimbal angle of the gimbal motors' lines, as of ``GimbalMotor.order``."""
-    return scenario.units.ripple
 
 
 def _variable(values, dimensions, unit, meaning):

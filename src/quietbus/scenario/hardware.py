@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import (
@@ -54,6 +54,9 @@ from quietbus.scenario.limits import MOST_LEGS, MOST_UNITS
 from quietbus.scenario.run_up import RunUp
 from quietbus.scenario.struts import AnyStrut, SpringDamperStrut
 from quietbus.scenario.units import expected
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 
 class Bus(Part):
@@ -163,6 +166,13 @@ class Mounting(Part):
     orientation: Vector[Angle] = ZERO  # [roll, pitch, yaw] of the base plate in the bus
     separation: Length  # of the upper-plate frame above the base-plate frame, nominal pose
     legs: Legs
+
+    def pose(self) -> tuple[np.ndarray, Rotation]:
+        """Origin [m] and attitude of the upper-plate frame in what it stands on, nominal pose."""
+        from scipy.spatial.transform import Rotation  # takes as long to load as all else here
+
+        base = Rotation.from_euler("ZYX", self.orientation[::-1])
+        return self.offset + base.apply([0.0, 0.0, self.separation]), base
 
     def joints(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper joints (n x 3) [m] in the base-plate frame, nominal pose."""

@@ -238,8 +238,7 @@ class Scenario(Part):
             return np.zeros(3), Rotation.identity()
         site = next(site for site in self.sites if site.name == body)
         p, turn = self.place(site.on)
-        base = Rotation.from_euler("ZYX", site.isolator.orientation[::-1])
-        own = site.isolator.offset + base.apply([0.0, 0.0, site.isolator.separation])
+        own, base = site.isolator.pose()
         return p + turn.apply(own), turn * base
 
     def sight(self, line: str) -> LineOfSight:

@@ -13,10 +13,10 @@ from jax.flatten_util import ravel_pytree
 
 from quietbus.dynamics.coefficients import slow_motion
 from quietbus.dynamics.equations import moving
-from quietbus.dynamics.rotor_response import orders_of, rotor_response, rotor_speeds
+from quietbus.dynamics.rotor_response import rotor_outputs
 from quietbus.dynamics.state import State
 from quietbus.dynamics.vibration import Vibration, sampled_coefficients, vibration_with
-from quietbus.dynamics.views import View, linear_outputs
+from quietbus.dynamics.views import NOTHING_SEEN, View
 from quietbus.model.satellite import Satellite
 
 SAMPLE_ERROR = 1e-5  # of a configuration between linearisations, in the shares that elements give
@@ -24,6 +24,14 @@ INSTANTS = 128  # responses per call, so that one program serves start and run, 
 SAMPLES = 16  # linearisations per call
 
 Chunk = tuple[dict[str, np.ndarray], np.ndarray, Vibration]
+
+
+def at_one(satellite: Satellite, state: State, time: float = 0.0) -> tuple[Vibration, np.ndarray]:
+    """Equations of small vibration and xi (cmg, order, m) of the free bodies at one state."""
+    states = jax.tree.map(lambda leaf: np.asarray(leaf)[None], state)
+    along = Along(satellite, np.array([time]), states)
+    _, xi, small = along.chunk(np.zeros(1, int), NOTHING_SEEN)
+    return instant(small, 0), xi[0]
 
 
 def instant(small: Vibration, k: int) -> Vibration:
@@ -38,8 +46,7 @@ class Along:
         """Of states (NumPy) with time [s] as the first axis."""
         self.satellite, self.time, self.states = satellite, time, states
         speeds = [np.asarray(cluster.units.rotor_speed) for cluster in satellite.clusters]
-        steady = all(cluster.rotors.steady for cluster in satellite.clusters)
-        self.one_speed = steady and len(np.unique(np.concatenate(speeds))) == 1
+        self.one_speed = satellite.steady and len(np.unique(np.concatenate(speeds))) == 1
         path = np.asarray(_compiled_path(satellite, time, states))
         self.nodes = nodes(path, SAMPLE_ERROR)
         rows = []
@@ -141,9 +148,6 @@ def _compiled_chunk(satellite, t, states, rows, view, one_speed):
         example = jax.eval_shape(lambda: sampled_coefficients(averaged, slow))
         _, unravel = ravel_pytree(jax.tree.map(lambda leaf: jnp.zeros(leaf.shape), example))
         small = vibration_with(averaged, slow, unravel(row))
-        xi = rotor_response(satellite, small, one_speed)
-        s = 1j * rotor_speeds(satellite, small)[:, None] * jnp.array(orders_of(satellite))
-        views = jax.vmap(jax.vmap(lambda s, x: linear_outputs(satellite, small, s, x, view)))
-        return views(s, xi), xi, small
+        return *rotor_outputs(satellite, small, view, one_speed), small
 
     return jax.vmap(one)(t, states, rows)

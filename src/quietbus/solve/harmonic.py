@@ -16,7 +16,7 @@ from quietbus.dynamics.rotor_response import orders_of
 from quietbus.dynamics.state import State
 from quietbus.dynamics.views import NOTHING_SEEN, View
 from quietbus.model.satellite import Satellite
-from quietbus.solve.along import INSTANTS, Along, instant
+from quietbus.solve.along import INSTANTS, Along, at_one, instant
 from quietbus.solve.direct import SLOW, Reached, Scheme, Solution, Tolerances, integrate
 from quietbus.solve.noise import Broadband, noise_spectra, noisy
 from quietbus.solve.periodic import without_jitter
@@ -119,10 +119,8 @@ def _cut(slow: Solution, count: int) -> Solution:
 
 def _growth(satellite: Satellite, slow: Solution) -> str:
     """Which mode grows where the slow motion went wrong."""
-    final = jax.tree.map(lambda leaf: np.asarray(leaf)[None], slow.final)
-    along = Along(satellite, np.array([slow.time[-1]]), final)
-    _, _, small = along.chunk(np.zeros(1, int), NOTHING_SEEN)
-    return growing(np.linalg.eigvals(instant(small, 0).state_matrix()), 0.0)
+    small, _ = at_one(satellite, slow.final, slow.time[-1])
+    return growing(np.linalg.eigvals(small.state_matrix()), 0.0)
 
 
 def respond(

@@ -11,7 +11,7 @@ from scipy.integrate import trapezoid
 
 from quietbus.dynamics.disturbance_response import CROSS, noise_psd
 from quietbus.dynamics.vibration import Vibration
-from quietbus.dynamics.views import View
+from quietbus.dynamics.views import NOTHING_SEEN, View
 from quietbus.model.cluster import Cluster
 from quietbus.model.disturbance import AbstractDisturbance, Noise
 from quietbus.model.satellite import Satellite
@@ -53,11 +53,10 @@ def with_noise(satellite: Satellite, seeds: Sequence[int], duration: float) -> S
         seeds: of the rotors; the same one gives the same noise.
         duration: [s] that it is to last without repeating.
     """
-    realised, first = [], 0
-    for cluster in satellite.clusters:
-        numbered = list(enumerate(seeds[first : first + cluster.count], first))
+    realised = []
+    for cluster, own in satellite.numbered():
+        numbered = list(enumerate(seeds[own], own.start))
         realised.append(_realised(cluster, numbered, duration))
-        first += cluster.count
     return replace(satellite, clusters=tuple(realised))
 
 
@@ -105,6 +104,13 @@ def noise_spectra(
         parts.append({k: np.asarray(v)[:, : len(these)] for k, v in part.items()})
     psd = {k: np.concatenate([p[k] for p in parts], axis=1) for k in parts[0]}
     return frequency, psd, psd.pop(CROSS)
+
+
+def noise_at(satellite: Satellite, small: Vibration) -> Broadband:
+    """Spectra of the answer to noise at one instant, of which ``small`` are the equations."""
+    modes = np.linalg.eigvals(small.state_matrix())
+    one = jax.tree.map(lambda leaf: np.asarray(leaf)[None], small)
+    return Broadband(np.zeros(1, int), *noise_spectra(satellite, one, modes, NOTHING_SEEN))
 
 
 def noisy(satellite: Satellite) -> list[AbstractDisturbance]:

@@ -13,11 +13,10 @@ from quietbus.dynamics.closed_loop import evaluate
 from quietbus.dynamics.rotor_response import orders_of, rotor_speeds
 from quietbus.dynamics.state import BodyState, State
 from quietbus.dynamics.vibration import Vibration
-from quietbus.dynamics.views import NOTHING_SEEN
 from quietbus.model.element import Own
 from quietbus.model.moments import ORDERS
 from quietbus.model.satellite import BUS, Satellite
-from quietbus.solve.along import Along, instant
+from quietbus.solve.along import at_one
 from quietbus.solve.validity import refuse_resonance
 from quietbus.spatial.rotation import (
     quaternion_multiply,
@@ -73,11 +72,10 @@ def without_jitter(satellite: Satellite, state: State) -> State:
 
 def steady_speeds(satellite: Satellite, state: State) -> np.ndarray:
     """Amplitudes (cmg, order, 6) of the bus's velocity [m/s] and rate [rad/s] at t = 0."""
-    states = jax.tree.map(lambda leaf: np.asarray(leaf)[None], state)
-    _, xi, small = Along(satellite, np.zeros(1), states).chunk(np.zeros(1, int), NOTHING_SEEN)
+    small, xi = at_one(satellite, state)
     speed, _ = rotors_at_start(satellite, state)
     omega = np.abs(np.outer(np.asarray(speed), orders_of(satellite)))
-    return omega[..., None] * np.abs(xi[0, ..., small.free.rows(BUS)])
+    return omega[..., None] * np.abs(xi[..., small.free.rows(BUS)])
 
 
 def rotors_at_start(
@@ -128,14 +126,12 @@ def _moved_by(satellite, state, small, xi):
 
 def _jitter_at(satellite: Satellite, state: State) -> tuple[Vibration, np.ndarray]:
     """Equations of small vibration at t = 0 and xi (cmg, order, m) of the free bodies."""
-    states = jax.tree.map(lambda leaf: np.asarray(leaf)[None], state)
-    _, xi, small = Along(satellite, np.zeros(1), states).chunk(np.zeros(1, int), NOTHING_SEEN)
-    small = instant(small, 0)
+    small, xi = at_one(satellite, state)
     modes = np.linalg.eigvals(small.state_matrix())
     refuse_resonance(
         satellite, "at t = 0 s", modes, np.asarray(rotors_at_start(satellite, state)[0])
     )
-    return small, xi[0]
+    return small, xi
 
 
 @eqx.filter_jit
@@ -178,12 +174,9 @@ def _jitter_squared(satellite, state, small, xi, chosen, base, turns):
 
     def rates(satellite, state):
         found = evaluate(satellite, jnp.zeros(()), state)
-        R_BN = found.now.motions[BUS].R_AX.T
-        parts = []
-        for name, _ in small.free.parts:
-            rows = found.u_rate[found.now.layout.rows(name)]
-            body = name in small.free.names
-            parts.append((rows.reshape(2, 3) @ R_BN.T).reshape(6) if body else rows)
+        every = found.now.layout
+        u_rate = every.turned(found.now.motions[BUS].R_AX.T, found.u_rate)
+        parts = [u_rate[every.rows(name)] for name, _ in small.free.parts]
         y = [found.rates[name].y for name, _ in layout.y]
         z = [found.rates[name].z for name, _ in layout.z]
         return tuple(jnp.concatenate([jnp.zeros(0), *each]) for each in (parts, y, z))
@@ -206,23 +199,19 @@ def _jitter_squared(satellite, state, small, xi, chosen, base, turns):
 
 def _turned(satellite: Satellite, state: State, phi) -> tuple[Satellite, State]:
     """Satellite and state with the rotors at other angles at t = 0."""
-    own, clusters, first = dict(state.own), [], 0
-    for cluster in satellite.clusters:
-        angle = phi[first : first + cluster.count]
-        turned, mine = cluster.turned(state.own, angle)
+    own, clusters = dict(state.own), []
+    for cluster, some in satellite.numbered():
+        turned, mine = cluster.turned(state.own, phi[some])
         clusters.append(turned)
         own |= mine
-        first += cluster.count
     return replace(satellite, clusters=tuple(clusters)), State(state.bodies, own)
 
 
 def _with_lines(satellite: Satellite, orders: tuple[float, ...], chosen) -> Satellite:
     """The satellite with some lines of its rotors only, without noise."""
-    first = 0
     clusters = []
-    for cluster in satellite.clusters:
-        mine = chosen[first : first + cluster.count]
-        first += cluster.count
+    for cluster, some in satellite.numbered():
+        mine = chosen[some]
         of_imbalance = mine[:, orders.index(ORDERS[0])]  # order 2 is in the group of order 1
         columns = np.array([orders.index(h) for h in cluster.disturbance.orders])
         clusters.append(cluster.with_lines(of_imbalance, mine[:, columns]))

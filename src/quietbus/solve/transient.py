@@ -19,8 +19,8 @@ from math import comb, factorial
 import numpy as np
 
 from quietbus.dynamics.vibration import Vibration
-from quietbus.dynamics.views import View, image_motions
-from quietbus.model.satellite import BUS, Satellite
+from quietbus.dynamics.views import View, images
+from quietbus.model.satellite import Satellite
 
 SEGMENT = 512  # instants at the most that are followed in one go
 CHIRP = 0.1  # [rad] phase that a changing speed may turn beyond an even one's in a step
@@ -137,7 +137,7 @@ def _answer(small: Vibration, s: np.ndarray) -> np.ndarray:
     standing = s == 0.0
     s = np.where(standing, 1j, s)[..., None, None]
     turns = len(memory.layout.columns) // 3
-    turn = np.kron(np.eye(turns), _turning(small))
+    turn = np.kron(np.eye(turns), np.asarray(small.turning))
     given = memory.by_pose + memory.by_rate @ (s * np.eye(3 * turns) + turn)
     by_z = np.broadcast_to(memory.by_z, (*s.shape[:-2], ny + nz, nz))
     back = np.concatenate([memory.by_y + s * memory.by_y_rate, by_z], axis=-1)
@@ -151,27 +151,19 @@ def _memories(small: Vibration) -> tuple[int, int]:
     return small.memory.layout.driven, small.memory.layout.kept
 
 
-def _turning(small: Vibration) -> np.ndarray:
-    return np.cross(small.slow.now.motions[BUS].w, np.eye(3)).T
-
-
 def _bus_rate(small: Vibration) -> np.ndarray:
     """(3, m): deviation of the bus's rate by states."""
     n, rows = len(small.M), small.rows
     matrix = np.zeros((3, _states(small)))
-    matrix[:, rows] = _turning(small)
+    matrix[:, rows] = np.asarray(small.turning)
     matrix[:, n + rows.start : n + rows.stop] = np.eye(3)
     return matrix
 
 
 def _images(satellite: Satellite, small: Vibration, view: View) -> np.ndarray:
     """(line, 3, m): motion of images by states."""
-    layout, motions = small.slow.now.layout, small.slow.now.motions
-    images = []
-    for line, (on, of) in zip(view.line_of_sight, view.bodies(satellite), strict=True):
-        x_on, x_of = (small.projection[layout.rows(body)] for body in (on, of))
-        images.append(line @ np.asarray(image_motions(motions[on], motions[of], x_on, x_of)))
-    return np.pad(np.stack(images), ((0, 0), (0, 0), (0, _states(small) - len(small.M))))
+    each = np.stack(images(satellite, small, view, small.projection))
+    return np.pad(each, ((0, 0), (0, 0), (0, _states(small) - len(small.M))))
 
 
 def _states(small: Vibration) -> int:

@@ -84,11 +84,9 @@ def ripple_said(satellite: Satellite, gimbal_rate: np.ndarray) -> tuple[str, ...
     Args:
         gimbal_rate: (n, cmg) of all units [rad/s].
     """
-    worst, first = 0.0, 0
-    for cluster in satellite.clusters:
-        rate = jnp.asarray(gimbal_rate[:, first : first + cluster.count])
-        worst = max(worst, float(cluster.modulation(rate)))
-        first += cluster.count
+    worst = 0.0
+    for cluster, own in satellite.numbered():
+        worst = max(worst, float(cluster.modulation(jnp.asarray(gimbal_rate[:, own]))))
     if worst <= SLOW_CHANGE:
         return ()
     return (

@@ -35,14 +35,13 @@ from quietbus.arguments import count as whole
 from quietbus.build import build_satellite
 from quietbus.dynamics.rotor_response import orders_of
 from quietbus.dynamics.vibration import Vibration
-from quietbus.dynamics.views import NOTHING_SEEN
 from quietbus.jaxconfig import compiled_for_few_runs
 from quietbus.model.moments import ORDERS
 from quietbus.model.satellite import Satellite
 from quietbus.model.variants import with_rotor_speed
 from quietbus.plain import ARCSEC, json_ready
 from quietbus.scenario import Scenario, ScenarioError
-from quietbus.solve.noise import Broadband, noise_spectra, noisy
+from quietbus.solve.noise import Broadband, noise_at, noisy
 from quietbus.solve.validity import ResonanceError, refuse_resonance
 
 MOUNTS = ("isolated", "rigid")
@@ -163,9 +162,8 @@ class JitterStudy:
             satellite, small = self.satellite(mount), self._at_rest[mount][1]
             found[mount] = None
             if noisy(satellite):
-                modes = np.linalg.eigvals(jax.tree.map(lambda leaf: leaf[0], small).state_matrix())
-                spectra = noise_spectra(satellite, small, modes, NOTHING_SEEN)
-                found[mount] = Broadband(np.zeros(1, int), *spectra)
+                small = jax.tree.map(lambda leaf: leaf[0], small)
+                found[mount] = noise_at(satellite, small)
         return found
 
     @property

@@ -119,7 +119,7 @@ class Study:
         isolator, (legs, *_) = self.scenario.sites[0].isolator, self.satellite.hexapods
         name = self._platform.body
         mass, center, inertia = platform_inertia(self.satellite, self.gimbal_angle, name)
-        stiffness, damping = map(np.asarray, legs.strut.tangent(legs.geometry.nominal_length))
+        stiffness, damping = map(np.asarray, legs.tangent)
         base = np.asarray(isolator.offset)
         R_BP = np.asarray(quaternion_to_matrix(self._platform.q_BX))
         plate = np.asarray(self._platform.p_BX_B) - base
@@ -238,7 +238,7 @@ class Study:
     def vertical_isolator(self) -> SingleAxisIsolator:
         """The platform as one mass on one strut, along the base plate's z axis."""
         legs = self.satellite.hexapods[0]
-        stiffness, damping = map(np.asarray, legs.strut.tangent(legs.geometry.nominal_length))
+        stiffness, damping = map(np.asarray, legs.tangent)
         lower, upper = self.scenario.sites[0].isolator.joints()
         along = ((upper - lower)[:, 2] / np.linalg.norm(upper - lower, axis=1)) ** 2
         mass = platform_inertia(self.satellite, self.gimbal_angle, self._platform.body)[0]

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-import jax
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -15,10 +14,9 @@ from quietbus.analysis.jitter.lines import AT_REST
 from quietbus.analysis.jitter.platforms import MOUNTS, Platforms
 from quietbus.arguments import choice, vector
 from quietbus.build import build_satellite
-from quietbus.dynamics.views import NOTHING_SEEN
 from quietbus.scenario import Problem, Scenario, ScenarioError
 from quietbus.scenario.checks import listed
-from quietbus.solve.noise import Broadband, noise_spectra, noisy
+from quietbus.solve.noise import noise_at, noisy
 from quietbus.solve.validity import refuse_resonance
 
 SHARED = ("bus", "control")  # what is the satellite's and not a platform's
@@ -100,11 +98,8 @@ class PlatformStudy:
         for mount in MOUNTS:
             found[mount] = np.zeros(3)
             if noisy(satellite):
-                small = self.platforms.small(mount)
-                modes = np.linalg.eigvals(small.state_matrix())
-                small = jax.tree.map(lambda leaf: np.asarray(leaf)[None], small)
-                spectra = noise_spectra(self.platforms.mounted(mount), small, modes, NOTHING_SEEN)
-                found[mount] = Broadband(np.zeros(1, int), *spectra).variance("bus_rate", 1)[0]
+                noise = noise_at(self.platforms.mounted(mount), self.platforms.small(mount))
+                found[mount] = noise.variance("bus_rate", 1)[0]
         return found
 
     def static_stroke(self, torque: ArrayLike) -> tuple[np.ndarray, ...]:

@@ -24,7 +24,7 @@ from quietbus.reference.motion import Motion
 from quietbus.solve.direct import Scheme, Solution, Tolerances, integrate
 from quietbus.validate.subject import Check, Subject, apart
 from quietbus.validate.trajectory import fly, lossless
-from quietbus.validate.translate import holding_legs, speeds_change, state_of
+from quietbus.validate.translate import holding_legs, state_of
 
 TOLERANCES = Tolerances(1e-11, 1e-13)
 SAMPLES = 20  # beside the start
@@ -78,7 +78,7 @@ def check_flight(subject: Subject, flight: Flight) -> Check:
     if np.any(legs):  # others' struts do not move
         theirs["leg_stroke"] = np.array([i.stroke[legs] for i in at])
         theirs["leg_force"] = np.array([i.strut_force[legs] for i in at])
-    if speeds_change(satellite):
+    if not satellite.steady:
         theirs["rotor_torque"] = np.array([i.rotor_torque for i in at])
     if at[0].joints is not None:
         for name in ("spherical_force", "universal_force"):

@@ -20,7 +20,6 @@ from quietbus.validate.translate import (
     driven_by,
     holding_legs,
     motion_of,
-    speeds_change,
     state_of,
 )
 
@@ -126,7 +125,7 @@ def _evaluated(satellite, times, states):
         if np.any(legs):
             reported["stroke"] = told["leg_stroke"][legs]
             reported["strut_force"] = told["leg_force"][legs]
-        if speeds_change(satellite):
+        if not satellite.steady:
             reported["rotor_torque"] = told["rotor_torque"]
         return accelerations, decisions, reported, {n: told[n] for n in JOINTS if n in told}
 
@@ -169,7 +168,7 @@ def _reported(theirs: Sequence[Instant], satellite: Satellite) -> list[dict]:
     """Of struts that move, and of motors where rotors change their speeds."""
     legs, found = holding_legs(satellite), []
     for at in theirs:
-        told = {"rotor_torque": at.rotor_torque} if speeds_change(satellite) else {}
+        told = {"rotor_torque": at.rotor_torque} if not satellite.steady else {}
         if np.any(legs):
             told |= {"stroke": at.stroke[legs], "strut_force": at.strut_force[legs]}
         found.append(told)

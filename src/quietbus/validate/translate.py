@@ -3,7 +3,6 @@
 Bodies go by their order in the satellite, units by theirs through all clusters.
 """
 
-from collections.abc import Iterator
 from dataclasses import fields
 from typing import Any
 
@@ -16,7 +15,7 @@ from quietbus.dynamics.closed_loop import attitudes
 from quietbus.dynamics.equations import moving, rates_of
 from quietbus.dynamics.state import BodyState, State
 from quietbus.jaxconfig import compiled_for_few_runs
-from quietbus.model.cluster import Cluster, Units
+from quietbus.model.cluster import Units
 from quietbus.model.element import Own, Rates
 from quietbus.model.satellite import BUS, CONTROL, Satellite
 from quietbus.model.struts import SpringDamper
@@ -168,8 +167,8 @@ def state_of(satellite: Satellite, motion: Motion) -> State:
         for i, body in enumerate(satellite.bodies)
         if body.name in satellite.free
     }
-    own = {element.name: element.start() for element in satellite.elements}
-    for cluster, some in numbered(satellite):
+    own = satellite.start()
+    for cluster, some in satellite.numbered():
         y, y_rate = (
             jnp.concatenate([of_gimbals[some][: cluster.cut], of_rotors[some]])[: cluster.driven]
             for of_gimbals, of_rotors in (
@@ -177,27 +176,13 @@ def state_of(satellite: Satellite, motion: Motion) -> State:
                 (m["gimbal_rate"], m["rotor_speed"]),
             )
         )
-        own[cluster.name] = Own.of(y=y, y_rate=y_rate)
-    own = {name: each for name, each in own.items() if sum(map(len, jax.tree.leaves(each)))}
-    memory = len(satellite.control.controller.start())
-    own[CONTROL] = Own.of(z=m["error_integral"][:memory])
+        if cluster.driven:
+            own[cluster.name] = Own.of(y=y, y_rate=y_rate)
+    own[CONTROL] = Own.of(z=m["error_integral"][: len(own[CONTROL].z)])
     return State(bodies, own)
-
-
-def numbered(satellite: Satellite) -> Iterator[tuple[Cluster, slice]]:
-    """The clusters and the numbers of their units."""
-    first = 0
-    for cluster in satellite.clusters:
-        yield cluster, slice(first, first + cluster.count)
-        first += cluster.count
 
 
 def holding_legs(satellite: Satellite) -> np.ndarray:
     """(leg,) which legs hold their bodies; others are between bodies that are one."""
     each = [np.full(len(h.strut.free_length), h.holds) for h in satellite.hexapods]
     return np.concatenate([np.zeros(0, bool), *each])
-
-
-def speeds_change(satellite: Satellite) -> bool:
-    """Whether any rotor changes its speed, so that motor torques are reported."""
-    return not all(cluster.rotors.steady for cluster in satellite.clusters)

@@ -12,13 +12,14 @@ from jaxtyping import Array, Complex, Float
 
 from quietbus.dynamics.closed_loop import initial_state
 from quietbus.dynamics.coefficients import SlowMotion, slow_motion
-from quietbus.dynamics.rotor_response import orders_of, rotor_response, rotor_speeds
+from quietbus.dynamics.rotor_response import rotor_outputs
 from quietbus.dynamics.vibration import Vibration, vibration
-from quietbus.dynamics.views import NOTHING_SEEN, View, linear_outputs
+from quietbus.dynamics.views import NOTHING_SEEN, View
 from quietbus.jaxconfig import compiled_for_few_runs
 from quietbus.model import variants
 from quietbus.model.cluster import Cluster
 from quietbus.model.satellite import Satellite
+from quietbus.model.unit import balanced
 
 Result = TypeVar("Result")
 AT_REST = 1e-6  # [m/s^2, rad/s^2] accelerations smaller than this are none
@@ -48,10 +49,7 @@ def steady_jitter(
     """
     satellite, averaged, slow = at_rest(satellite, gimbal_angle)
     small = vibration(averaged, slow)
-    xi = rotor_response(satellite, small)
-    s = 1j * rotor_speeds(satellite, small)[:, None] * jnp.array(orders_of(satellite))
-    outputs = jax.vmap(jax.vmap(lambda s, x: linear_outputs(satellite, small, s, x, view)))
-    return outputs(s, xi), small
+    return rotor_outputs(satellite, small, view)[0], small
 
 
 steady_jitter_once = compiled_for_few_runs(steady_jitter)
@@ -84,9 +82,7 @@ def imbalance_kinds(satellite: Satellite) -> list[Satellite]:
 def _kinds_of(cluster: Cluster) -> list[Cluster]:
     units = cluster.units
     speed_axes = jnp.broadcast_to(jnp.eye(3), units.R_GF.shape)
-    inertia = units.I_RRcm_R
-    transverse = 0.5 * (inertia[:, 1, 1] + inertia[:, 2, 2])
-    even = jax.vmap(jnp.diag)(jnp.stack([inertia[:, 0, 0], transverse, transverse], axis=1))
+    inertia, even = units.I_RRcm_R, balanced(units).I_RRcm_R
     products = inertia.at[:, 1, 2].set(0.0).at[:, 2, 1].set(0.0)
     products = products - jax.vmap(jnp.diag)(jnp.diagonal(inertia, axis1=1, axis2=2)) + even
     none = jnp.zeros_like(units.eccentricity)

@@ -77,6 +77,11 @@ class Hexapod(AbstractElement):
         """Tension of the struts [N]."""
         return self.strut.tension(motion.length, motion.length_rate, own.z)
 
+    @property
+    def tangent(self) -> tuple[Float[Array, " leg"], Float[Array, " leg"]]:
+        """Stiffness [N/m] and damping [N s/m] of the struts about their nominal lengths."""
+        return self.strut.tangent(self.geometry.nominal_length)
+
     def mass(self, around):
         return leg_mass_matrix(self.bodies, self.motion(around))
 
