@@ -4,10 +4,23 @@ A law serves all legs of a hexapod at once. One with memory says how it changes;
 in vibration and in the energy balance it then takes part as it is.
 """
 
+from typing import NamedTuple
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
+
+
+class StrutTangent(NamedTuple):
+    """Struts for small motion: tension ``k e + c e' + F z`` with ``z' = E e + R e' + Z z``."""
+
+    stiffness: Float[Array, " leg"]  # k [N/m], memory held
+    damping: Float[Array, " leg"]  # c [N s/m], memory held
+    force: Float[Array, "leg z"]  # F
+    elongation: Float[Array, "z leg"]  # E
+    rate: Float[Array, "z leg"]  # R
+    decay: Float[Array, "z z"]  # Z
 
 
 class AbstractStrut(eqx.Module):
@@ -25,14 +38,16 @@ class AbstractStrut(eqx.Module):
         """Tension [N] at lengths [m] and their rates [m/s]."""
         raise NotImplementedError
 
-    def tangent(
-        self, length: Float[Array, " leg"]
-    ) -> tuple[Float[Array, " leg"], Float[Array, " leg"]]:
-        """Stiffness [N/m] and damping [N s/m] about lengths at rest, memory held."""
+    def tangent(self, length: Float[Array, " leg"]) -> StrutTangent:
+        """For small motion about lengths at rest, with the memory of the start."""
         z, still, one = self.start(), jnp.zeros_like(length), jnp.ones_like(length)
         law = lambda length, rate: self.tension(length, rate, z)  # noqa: E731
         at = (length, still)
-        return jax.jvp(law, at, (one, still))[1], jax.jvp(law, at, (still, one))[1]
+        k, c = jax.jvp(law, at, (one, still))[1], jax.jvp(law, at, (still, one))[1]
+        forces = jax.jacfwd(self.tension, argnums=2)(length, still, z)
+        return StrutTangent(
+            k, c, forces, *jax.jacfwd(self.memory_rate, argnums=(0, 1, 2))(length, still, z)
+        )
 
     def memory_rate(
         self, length: Float[Array, " leg"], rate: Float[Array, " leg"], z: Float[Array, " z"]

@@ -316,8 +316,9 @@ def isolator(study: Study) -> Figure:
         axes.plot(gamma, transmissibility(gamma, xi), label=rf"$\xi$ = {xi:g}", **LINES[i])
         axes.plot(*transmissibility_peak(xi), MARKERS[i], color=COLOURS[i], markersize=4)
     vertical = study.vertical_isolator
-    label = rf"this platform along z, $\xi$ = {vertical.damping_ratio:.3g}"
-    own = transmissibility(gamma, vertical.damping_ratio)
+    natural = vertical.natural_frequency
+    label = rf"this platform along z, $f_n$ = {natural / (2.0 * np.pi):.3g} Hz"
+    own = vertical.transmissibility(gamma * natural)
     axes.plot(gamma, own, color="0.5", linewidth=3, alpha=0.6, label=label)
     axes.axvline(CROSSING, color="0.4", linewidth=0.8, linestyle=":")
     axes.annotate(

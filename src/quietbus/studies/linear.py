@@ -12,8 +12,12 @@ from quietbus.analysis.control.channels import Channels, channels
 from quietbus.analysis.control.controlled import ControlledSatellite, controlled
 from quietbus.analysis.control.coupled import CoupledAnalysis, analyze_coupled, stable_gain_range
 from quietbus.analysis.control.designs import DesignRule, corner_rule
-from quietbus.analysis.control.hexapod import hexapod_isolator
-from quietbus.analysis.control.isolator import SingleAxisIsolator
+from quietbus.analysis.control.hexapod import (
+    HexapodIsolator,
+    SingleAxisPlatform,
+    StrutMemory,
+    hexapod_isolator,
+)
 from quietbus.analysis.control.loop import Loop, attitude_loop
 from quietbus.analysis.control.margins import LoopAnalysis, analyze_loop
 from quietbus.analysis.control.modes import Mode, fixed_base_modes, free_modes
@@ -91,12 +95,6 @@ class Study:
                 "The scenario lets no unit act (steering: none), so that a run feels no control; "
                 "the loop is analysed as if the plate received the torque that is asked for."
             )
-        if self.satellite.hexapods[0].strut.start().size:
-            notes.append(
-                "The struts have memory. Channels, the loops per axis and the rules take them as "
-                "springs that forget nothing, with no damping of the memory: do not rely on those. "
-                "The coupled loop, the modes and the transmissibility have the struts as they are."
-            )
         if len(self.scenario.sites) > 1:
             others = ", ".join(site.name for site in self.scenario.sites[1:])
             notes.append(
@@ -114,27 +112,31 @@ class Study:
         return linearize(self.satellite, self.point, actuator)
 
     @cached_property
-    def channels(self) -> Channels:
-        """Torque channels of the platform on a fixed base, massless legs (eq. 31-33)."""
+    def isolator(self) -> HexapodIsolator:
+        """The platform on massless legs over a fixed base, about the base plate's centre."""
         isolator, (legs, *_) = self.scenario.sites[0].isolator, self.satellite.hexapods
         name = self._platform.body
         mass, center, inertia = platform_inertia(self.satellite, self.gimbal_angle, name)
-        stiffness, damping = map(np.asarray, legs.tangent)
+        stiffness, damping, *memory = map(np.asarray, legs.tangent)
         base = np.asarray(isolator.offset)
         R_BP = np.asarray(quaternion_to_matrix(self._platform.q_BX))
         plate = np.asarray(self._platform.p_BX_B) - base
-        return channels(
-            hexapod_isolator(  # all from the base plate's centre, in bus axes
-                upper_joints=plate + np.asarray(legs.geometry.p_PU_P) @ R_BP.T,
-                lower_joints=np.asarray(legs.geometry.p_BA_B) - base,
-                separation=0.0,
-                mass=mass,
-                inertia=R_BP @ inertia @ R_BP.T,
-                center_of_mass=plate + R_BP @ center,
-                stiffness=stiffness,
-                damping=damping,
-            )
+        return hexapod_isolator(  # in bus axes
+            upper_joints=plate + np.asarray(legs.geometry.p_PU_P) @ R_BP.T,
+            lower_joints=np.asarray(legs.geometry.p_BA_B) - base,
+            separation=0.0,
+            mass=mass,
+            inertia=R_BP @ inertia @ R_BP.T,
+            center_of_mass=plate + R_BP @ center,
+            stiffness=stiffness,
+            damping=damping,
+            memory=StrutMemory(*memory),
         )
+
+    @cached_property
+    def channels(self) -> Channels:
+        """Torque channels of the platform on a fixed base, massless legs (eq. 31-33)."""
+        return channels(self.isolator)
 
     @cached_property
     def loops(self) -> dict[str, Loop] | None:
@@ -234,15 +236,11 @@ class Study:
         fixed = linearize(with_base_fixed(self.satellite), self.point, "ideal")
         return {"fixed_base": fixed_base_modes(fixed), "free": free_modes(self.linear("ideal"))}
 
-    @property
-    def vertical_isolator(self) -> SingleAxisIsolator:
-        """The platform as one mass on one strut, along the base plate's z axis."""
-        legs = self.satellite.hexapods[0]
-        stiffness, damping = map(np.asarray, legs.tangent)
-        lower, upper = self.scenario.sites[0].isolator.joints()
-        along = ((upper - lower)[:, 2] / np.linalg.norm(upper - lower, axis=1)) ** 2
-        mass = platform_inertia(self.satellite, self.gimbal_angle, self._platform.body)[0]
-        return SingleAxisIsolator(mass, float(along @ stiffness), float(along @ damping))
+    @cached_property
+    def vertical_isolator(self) -> SingleAxisPlatform:
+        """The platform as one mass on its struts, along the base plate's z axis."""
+        z = np.asarray(quaternion_to_matrix(self._platform.q_BX))[:, 2]
+        return SingleAxisPlatform(self.isolator, self.isolator.legs_P[:, :3] @ z)
 
     @property
     def rotor_frequencies_hz(self) -> np.ndarray:

@@ -122,7 +122,7 @@ def random_wrenches(satellite: Satellite, rng: np.random.Generator) -> np.ndarra
     arm = shortest_leg(satellite)
     force = 0.1 * float(satellite.bus.mass_X)
     for legs in satellite.hexapods:
-        stiffness, _ = legs.tangent
+        stiffness = legs.tangent.stiffness
         force = min(force, 0.002 * arm * float(jnp.sum(stiffness)))
     scale = force * np.array([1.0, arm])
     return scale[:, None] * rng.uniform(-1.0, 1.0, (len(satellite.bodies), 2, 3))

@@ -234,7 +234,7 @@ def fastest_rate(satellite: Satellite) -> float:
         arms = [np.asarray(p @ m.R_AX.T) for p, m in zip(joints, hosts, strict=True)]
         span = np.asarray(hosts[0].p - hosts[1].p) + arms[0] - arms[1]
         s = span / np.linalg.norm(span, axis=1, keepdims=True)
-        k, c = (np.asarray(each) for each in legs.tangent)
+        k, c = (np.asarray(each) for each in legs.tangent[:2])
         for name, motion, arm in zip(legs.hosts, hosts, arms, strict=True):
             mass, inertia = _with_units(satellite, name)
             R = np.asarray(motion.R_AX)

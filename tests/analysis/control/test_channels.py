@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quietbus.analysis.control.channels import channels
-from quietbus.analysis.control.hexapod import hexapod_isolator
+from quietbus.analysis.control.hexapod import SingleAxisPlatform, StrutMemory, hexapod_isolator
 from quietbus.analysis.control.rational import minus_3db_frequency, peak
 from quietbus.analysis.control.symbolic import SymbolicChannel
 
@@ -50,6 +50,13 @@ OMEGA = np.geomspace(0.5, 300.0, 40)
 def rotation_z(angle):
     cos, sin = np.cos(angle), np.sin(angle)
     return np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1.0]])
+
+
+def three_parameter(k, k_B, c):
+    """Keywords of struts k + k_B c s / (k_B + c s): z is the damper's elongation."""
+    k, k_B, c = np.full(6, k), np.full(6, k_B), np.full(6, c)
+    memory = StrutMemory(np.diag(-k_B), np.diag(k_B / c), np.zeros((6, 6)), np.diag(-k_B / c))
+    return {"stiffness": k + k_B, "damping": 0.0, "memory": memory}
 
 
 # --- the paper -------------------------------------------------------------------------------
@@ -207,6 +214,69 @@ def test_response_against_state_space():
     system = control.ss(a, b, c, np.zeros((6, 6)))
     expected = np.moveaxis(system(1j * OMEGA), -1, 0)
     np.testing.assert_allclose(isolator.transmissibility(OMEGA), expected, atol=1e-9)
+
+
+def test_channel_of_alike_struts_is_the_papers_with_their_dynamic_stiffness():
+    """All of eq. 31-33 depends on s^2 and u = c s + k only: put u = Z(s)."""
+    k, k_B, c = 20e3, 100e3, 900.0
+    found = channels(hexapod_isolator(**PAPER | three_parameter(k, k_B, c)))
+    s = 1j * OMEGA
+    u = k + k_B * c * s / (k_B + c * s)
+    for axis, plain in zip(found, channels(hexapod_isolator(**PAPER)), strict=True):
+        ratio = s**2 / u
+        symbols = plain.symbolic
+        expected = np.polyval(symbols.numerator, ratio) / np.polyval(symbols.denominator, ratio)
+        # numerator and denominator stand over the same power of u
+        lift = len(symbols.denominator) - len(symbols.numerator)
+        assert lift >= 0
+        np.testing.assert_allclose(axis.response(OMEGA), expected, rtol=1e-9)
+        assert axis.symbolic is None
+        np.testing.assert_allclose(
+            axis.undamped_frequencies_hz, plain.undamped_frequencies_hz, rtol=1e-9
+        )
+        assert len(axis.poles) < 6  # minimal: no memory that takes no part
+
+
+def test_channels_of_unlike_struts_with_memory_equal_the_full_model():
+    """Polynomials and poles against the 6 x 6 solve with each strut's own dynamic stiffness."""
+    k = np.array([20e3, 22e3, 19e3, 20e3, 21e3, 18e3])
+    k_B = np.array([100e3, 60e3, 80e3, 200e3, 10e3, 100e3])
+    c = np.array([900.0, 500.0, 700.0, 1500.0, 50.0, 900.0])
+    isolator = hexapod_isolator(**CROOKED | three_parameter(k, k_B, c))
+    s = 1j * OMEGA[:, None]
+    Z = k + k_B * c * s / (k_B + c * s)
+    dynamic = s[..., None] ** 2 * isolator.mass_matrix + np.einsum(
+        "li,wl,lj->wij", isolator.legs_P, Z, isolator.legs_P
+    )
+    through = np.einsum("li,wl,lj->wij", isolator.legs_D, Z, isolator.legs_P)
+    full = through @ np.linalg.inv(dynamic)
+    np.testing.assert_allclose(isolator.transmissibility(OMEGA), full, rtol=1e-9, atol=1e-12)
+    for i, channel in enumerate(channels(isolator)):
+        exact = full[:, 3 + i, 3 + i]
+        error = np.abs(channel.response(OMEGA) - exact)
+        assert np.max(error / (1 + np.abs(exact))) < 1e-9
+        roots = np.roots(channel.denominator)
+        for pole in channel.poles:
+            assert np.min(np.abs(roots / complex(pole.real, pole.imag) - 1.0)) < 1e-6
+
+
+def test_one_mass_on_its_struts_has_the_published_peak():
+    """Three parameters with the best damping: peak 1 + 2/N at w0 sqrt(2 (N + 1)/(N + 2))."""
+    N, k = 5.0, 20e3
+    along = PAPER["separation"] / np.linalg.norm(
+        UPPER + np.array([0, 0, PAPER["separation"]]) - LOWER, axis=1
+    )
+    k_A = k * np.sum(along**2)
+    best = N * np.sqrt(2 * (N + 2)) / (4 * (N + 1)) * 2 * np.sqrt(k_A * PAPER["mass"])
+    struts = three_parameter(k, N * k, best / np.sum(along**2))
+    vertical = SingleAxisPlatform(hexapod_isolator(**PAPER | struts), along)
+    w0 = np.sqrt(k_A / PAPER["mass"])
+    assert vertical.natural_frequency == pytest.approx(w0, rel=1e-12)
+    near = w0 * np.sqrt(2 * (N + 1) / (N + 2)) * np.linspace(0.9, 1.1, 2001)
+    gains = vertical.transmissibility(near)
+    assert gains.max() == pytest.approx(1 + 2 / N, rel=1e-9)
+    assert np.argmax(gains) == 1000
+    assert vertical.transmissibility(100 * w0) == pytest.approx(6.0e-4, rel=0.01)
 
 
 def test_static_wrench_passes_unchanged():

@@ -8,9 +8,10 @@ the struts' stiffness and damping,
     M x'' + C x' + K x = w,        K = J^T diag(k) J,   C = J^T diag(c) J,
     base wrench = J_D^T (diag(k) J x + diag(c) J x').
 
-A channel is the exact, minimal rational function from the torque about one axis to the base
-torque about the same axis (`minimal`). Where all legs have the same c/k, it depends on s through
-u = c s + k and s^2 only, and is then also given with k and c as symbols (`symbolic`).
+What struts remember adds to their tension. A channel is the exact, minimal rational function from
+the torque about one axis to the base torque about the same axis (`minimal`). Where all legs have
+the same c/k and remember nothing, it depends on s through u = c s + k and s^2 only, and is then
+also given with k and c as symbols (`symbolic`).
 """
 
 from __future__ import annotations
@@ -42,11 +43,11 @@ class Channel:
     axis: str
     numerator: Coefficients  # descending powers of s; leading coefficient c, or k if undamped
     denominator: Coefficients  # descending powers of s; same normalisation, see `SymbolicChannel`
-    symbolic: SymbolicChannel | None  # None where legs differ in c/k; then D is monic
+    symbolic: SymbolicChannel | None  # None where legs differ in c/k or remember; then D is monic
     peak_frequency_hz: float  # [Hz] of the largest gain; 0 if largest at rest
     peak_gain: float  # [-] inf for an undamped channel
     minus_3db_frequency_hz: float | None  # [Hz] gain first falls below 1/sqrt(2)
-    undamped_frequencies_hz: tuple[float, ...]  # [Hz] with the dampers taken out
+    undamped_frequencies_hz: tuple[float, ...]  # [Hz] of the stiffness at rest
     poles: tuple[Pole, ...]  # damped frequencies and damping ratios
     coupling: float  # [-] largest gain to the base torque about another axis, any frequency
     coupling_axis: str | None  # that other axis; None without coupling
@@ -141,9 +142,7 @@ def _channel(isolator: HexapodIsolator, i: int, gains: Array) -> Channel:
         peak_frequency_hz=peak_frequency / (2.0 * math.pi),
         peak_gain=peak_gain,
         minus_3db_frequency_hz=None if minus_3db is None else minus_3db / (2.0 * math.pi),
-        undamped_frequencies_hz=tuple(
-            (np.sqrt(np.linalg.eigvalsh(reduced.K)) / (2.0 * math.pi)).tolist()
-        ),
+        undamped_frequencies_hz=tuple((reduced.undamped_frequencies() / (2.0 * math.pi)).tolist()),
         poles=reduced.poles(),
         coupling=float(gains[other]),
         coupling_axis=AXES[other] if gains[other] > 0 else None,

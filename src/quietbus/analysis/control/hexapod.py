@@ -11,6 +11,36 @@ from quietbus.analysis.control.rational import Array
 
 
 @dataclass(frozen=True, eq=False)
+class StrutMemory:
+    """What n struts with elongations e remember: tension F z more, with z' = E e + R e' + Z z."""
+
+    force: Array  # (n, m) F [N]
+    elongation: Array  # (m, n) E [1/m/s]
+    rate: Array  # (m, n) R [1/m]
+    decay: Array  # (m, m) Z [1/s]
+
+    @classmethod
+    def none(cls, n: int) -> StrutMemory:
+        """Of n struts that remember nothing."""
+        return cls(np.zeros((n, 0)), np.zeros((0, n)), np.zeros((0, n)), np.zeros((0, 0)))
+
+    @property
+    def size(self) -> int:
+        """Count m of what is remembered."""
+        return len(self.decay)
+
+    def per_elongation(self, s: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """z per elongation of each strut (..., m, n) at s (...) [rad/s]."""
+        s = s[..., None, None]
+        return np.linalg.solve(s * np.eye(self.size) - self.decay, self.elongation + s * self.rate)
+
+    @property
+    def stiffness(self) -> Array:
+        """What it adds (n, n) [N/m] to the stiffness at rest, as far as it comes to rest."""
+        return -self.force @ np.linalg.pinv(self.decay) @ self.elongation
+
+
+@dataclass(frozen=True, eq=False)
 class HexapodIsolator:
     """An upper platform on n massless legs over a fixed base, for small motion.
 
@@ -22,24 +52,27 @@ class HexapodIsolator:
     mass_matrix: Array  # (6, 6) [kg], [kg m^2] about the platform's mass centre
     legs_P: Array  # (n, 6) [-], [m] J: elongation per platform motion
     legs_D: Array  # (n, 6) [-], [m] J_D: base wrench about D per tension
-    stiffness: Array  # (n,) [N/m]
-    damping: Array  # (n,) [N s/m]
+    stiffness: Array  # (n,) [N/m], memory held
+    damping: Array  # (n,) [N s/m], memory held
+    memory: StrutMemory
 
     @property
     def stiffness_matrix(self) -> Array:
-        """K (6, 6) [N/m], [N], [N m/rad] about the platform's mass centre."""
-        return self.legs_P.T @ (self.stiffness[:, None] * self.legs_P)
+        """K (6, 6) [N/m], [N], [N m/rad] about the platform's mass centre, at rest."""
+        return self.legs_P.T @ (np.diag(self.stiffness) + self.memory.stiffness) @ self.legs_P
 
     @property
     def damping_matrix(self) -> Array:
-        """C (6, 6) [N s/m], [N s], [N m s/rad] about the platform's mass centre."""
+        """C (6, 6) [N s/m], [N s], [N m s/rad] about the platform's mass centre, memory held."""
         return self.legs_P.T @ (self.damping[:, None] * self.legs_P)
 
     @property
     def is_proportional(self) -> bool:
-        """Whether every leg has the same damping per stiffness."""
+        """Whether every leg has the same damping per stiffness, and none a memory."""
         k, c = self.stiffness, self.damping
-        return bool(np.allclose(c * k.mean(), k * c.mean(), rtol=1e-12, atol=0.0))
+        return self.memory.size == 0 and bool(
+            np.allclose(c * k.mean(), k * c.mean(), rtol=1e-12, atol=0.0)
+        )
 
     def transmissibility(self, omega: ArrayLike) -> NDArray[np.complex128]:
         """Wrench on the platform to wrench on the base, (..., 6, 6).
@@ -47,14 +80,41 @@ class HexapodIsolator:
         Args:
             omega: angular frequencies [rad/s], any shape.
         """
-        s = 1j * np.asarray(omega, float)[..., None, None]
-        dynamic = s**2 * self.mass_matrix + s * self.damping_matrix + self.stiffness_matrix
-        strut = s * self.damping[:, None] + self.stiffness[:, None]
-        return self.legs_D.T @ (strut * self.legs_P) @ np.linalg.inv(dynamic)
+        s = 1j * np.asarray(omega, float)
+        struts = self.strut_stiffness(s) @ self.legs_P
+        dynamic = s[..., None, None] ** 2 * self.mass_matrix + self.legs_P.T @ struts
+        return self.legs_D.T @ struts @ np.linalg.inv(dynamic)
+
+    def strut_stiffness(self, s: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """Dynamic stiffness Z (..., n, n) [N/m], tension per elongation at s (...) [rad/s]."""
+        own = self.stiffness + s[..., None] * self.damping
+        return own[..., None] * np.eye(len(self.stiffness)) + self.memory.force @ (
+            self.memory.per_elongation(s)
+        )
 
     def torque_response(self, omega: ArrayLike) -> NDArray[np.complex128]:
         """Torque on the platform to torque on the base about D, (..., 3, 3)."""
         return self.transmissibility(omega)[..., 3:, 3:]
+
+
+@dataclass(frozen=True, eq=False)
+class SingleAxisPlatform:
+    """A platform that moves along one line only: one mass on all its struts."""
+
+    isolator: HexapodIsolator
+    along: Array  # (n,) [-] elongation of each strut per displacement
+
+    @property
+    def natural_frequency(self) -> float:
+        """Of the stiffness at rest [rad/s]."""
+        own = np.diag(self.isolator.stiffness) + self.isolator.memory.stiffness
+        return float(np.sqrt(self.along @ own @ self.along / self.isolator.mass_matrix[0, 0]))
+
+    def transmissibility(self, omega: ArrayLike) -> Array:
+        """Force on the base per force on the mass, abs [-] at `omega` [rad/s], any shape."""
+        s = 1j * np.asarray(omega, float)
+        struts = self.isolator.strut_stiffness(s) @ self.along @ self.along
+        return np.abs(struts / (struts + s**2 * self.isolator.mass_matrix[0, 0]))
 
 
 def hexapod_isolator(
@@ -66,6 +126,7 @@ def hexapod_isolator(
     center_of_mass: ArrayLike,
     stiffness: ArrayLike,
     damping: ArrayLike,
+    memory: StrutMemory | None = None,
 ) -> HexapodIsolator:
     """The small-motion model of a platform on its legs, in the nominal pose.
 
@@ -78,6 +139,7 @@ def hexapod_isolator(
         center_of_mass: (3,) of the same in the upper plate's frame [m].
         stiffness: (n,) or one number for all legs [N/m].
         damping: (n,) or one number for all legs [N s/m].
+        memory: of the struts, if they have any; stiffness and damping are those with it held.
 
     Raises:
         ValueError: a value of the wrong shape or sign, or legs that leave a motion free.
@@ -111,6 +173,7 @@ def hexapod_isolator(
         legs_D=np.hstack([s, np.cross(lower, s)]),
         stiffness=k,
         damping=c,
+        memory=memory or StrutMemory.none(n),
     )
     _check_held(isolator)
     return isolator

@@ -17,7 +17,7 @@ from quietbus.model.legs.joints import joint_forces
 from quietbus.model.legs.kinematics import Geometry, LegMotion, leg_motion
 from quietbus.model.legs.rigid_parts import joint_motion, leg_rigid_parts
 from quietbus.model.report import AXIS, LEG, Output, Quantity
-from quietbus.model.struts import AbstractStrut
+from quietbus.model.struts import AbstractStrut, StrutTangent
 
 STROKE = Quantity("leg_stroke", LEG, "m", "leg length less its nominal length", vibrates=True)
 FORCE = Quantity("leg_force", LEG, "N", "force of the strut, tension positive", vibrates=True)
@@ -78,8 +78,8 @@ class Hexapod(AbstractElement):
         return self.strut.tension(motion.length, motion.length_rate, own.z)
 
     @property
-    def tangent(self) -> tuple[Float[Array, " leg"], Float[Array, " leg"]]:
-        """Stiffness [N/m] and damping [N s/m] of the struts about their nominal lengths."""
+    def tangent(self) -> StrutTangent:
+        """The struts for small motion about their nominal lengths."""
         return self.strut.tangent(self.geometry.nominal_length)
 
     def mass(self, around):

@@ -199,7 +199,7 @@ def corner(bench: Bench) -> Findings:
             numbers["corner_z_below"] = 20.0 * float(np.log10(channel.peak_gain / there))
         numbers[f"corner_{name}_3db"] = channel.minus_3db_frequency_hz or np.nan
     legs = bench.study.satellite.hexapods[0]
-    stiffness, damping = legs.tangent
+    stiffness, damping, *_ = legs.tangent
     as_printed = printed_channel(float(stiffness[0]), float(damping[0]))
     numbers["printed_corner"] = peak(*as_printed)[0] / (2.0 * np.pi)
     loops = bench.study.loop_analyses
