@@ -29,7 +29,7 @@ class StrutMemory:
         """Count m of what is remembered."""
         return len(self.decay)
 
-    def per_elongation(self, s: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    def per_elongation(self, s: NDArray[np.complex128]) -> NDArray:
         """z per elongation of each strut (..., m, n) at s (...) [rad/s]."""
         s = s[..., None, None]
         return np.linalg.solve(s * np.eye(self.size) - self.decay, self.elongation + s * self.rate)
