@@ -8,8 +8,9 @@ from pathlib import Path
 # optimisations it takes half as long. Results differ by rounding, which no test may rest on.
 os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} --xla_backend_optimization_level=0"
 
-import jax
 import pytest
+
+from quietbus import programs
 
 MAPS = Path("/proc/self/maps")
 MANY = 30_000  # memory maps; Linux ends a process that has 65530
@@ -20,5 +21,5 @@ def _room_for_compiled_programs():
     """Each compiled program takes memory maps for ever; the cache on disk keeps it all the same."""
     yield
     if not MAPS.exists() or MAPS.read_text().count("\n") > MANY:
-        jax.clear_caches()
+        programs.forget()
         gc.collect()

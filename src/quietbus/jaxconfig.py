@@ -5,21 +5,14 @@ Imported by every package that computes, before it uses JAX. What the user has a
 it is: docs/api.md says what changes in the process.
 """
 
-import functools
 import os
-from collections.abc import Callable
 from importlib.metadata import version
-from typing import TypeVar
 
-import equinox as eqx
 import jax
-import jax.numpy as jnp
 from jaxlib.xla_client import CompileOptions
 from platformdirs import user_cache_path
 
 from quietbus.processes import DeviceError
-
-Function = TypeVar("Function", bound=Callable)
 
 # XLA runs each small operation of a loop as a kernel of its own, with an overhead as large as the
 # operation. Loops that touch less than this many bytes are compiled as one function instead, which
@@ -33,20 +26,21 @@ if (0, 6) <= tuple(int(part) for part in version("jaxlib").split(".")[:2]) < (0,
     _FLAGS["xla_cpu_use_fusion_emitters"] = "false"
 
 
-def _let_xla_read_flags() -> None:
+def _let_xla_read_flags() -> str:
     """XLA reads its flags once in a process; programs that the user starts have no part in them."""
     given = os.environ.get("XLA_FLAGS")
     added = [f"--{flag}={value}" for flag, value in _FLAGS.items() if flag not in (given or "")]
-    os.environ["XLA_FLAGS"] = " ".join([given or "", *added]).strip()
+    read = os.environ["XLA_FLAGS"] = " ".join([given or "", *added]).strip()
     try:
         _ = CompileOptions().executable_build_options.debug_options  # for which XLA reads them
     finally:
         del os.environ["XLA_FLAGS"]
         if given is not None:
             os.environ["XLA_FLAGS"] = given
+    return read
 
 
-_let_xla_read_flags()
+XLA_FLAGS = _let_xla_read_flags()
 jax.config.update("jax_enable_x64", True)
 
 if jax.config.values["jax_compilation_cache_dir"] is None:
@@ -63,32 +57,3 @@ if os.environ.get("JAX_PLATFORMS", "cpu") not in ("", "cpu"):
             f"JAX_PLATFORMS={os.environ['JAX_PLATFORMS']} asks for a device that JAX does not find "
             "here; leave it out to compute on the processor"
         ) from None
-
-
-def compiled_for_few_runs(function: Function) -> Function:
-    """``equinox.filter_jit`` with little optimisation, for programs that run once or a few times.
-
-    Compilation takes a third of the time, a run twice as long. Values may differ by rounding. Not
-    for use within another program.
-    """
-
-    @functools.cache
-    def compiled():
-        return eqx.filter_jit(function, **_few_runs())
-
-    @functools.wraps(function)
-    def run(*args, **kwargs):
-        return compiled()(*args, **kwargs)
-
-    return run  # type: ignore[return-value]
-
-
-@functools.cache
-def _few_runs() -> dict:
-    """What ``filter_jit`` takes for it; nothing where XLA does not know these options."""
-    options = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 0}
-    try:
-        jax.jit(lambda: jnp.zeros(()), compiler_options=options)()
-    except jax.errors.JaxRuntimeError:
-        return {}
-    return {"compiler_options": options}

@@ -3,7 +3,6 @@
 import dataclasses
 from typing import Literal
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -24,6 +23,7 @@ from quietbus.model.legs.hexapod import Hexapod
 from quietbus.model.satellite import BUS, Satellite
 from quietbus.model.steering import NoSteering
 from quietbus.model.variants import balanced
+from quietbus.programs import compiled_for_few_runs
 from quietbus.scenario import Scenario
 from quietbus.scenario.sites import Site, from_the_bus
 
@@ -81,19 +81,22 @@ def build_satellite(
     )
     if not said:
         return satellite
-    inertia = _whole_inertia(balanced(satellite), array(scenario.units.gimbal_angles))
+    inertia = _whole_inertia(satellite, array(scenario.units.gimbal_angles))
     pid = controller_of(said, np.asarray(inertia))
     return dataclasses.replace(satellite, control=dataclasses.replace(control, controller=pid))
 
 
 def build_initial_state(scenario: Scenario, satellite: Satellite) -> State:
     """State at the start of a run: all bodies moving as one, bus mass centre at the origin."""
-    return jax.jit(initial_state)(
+    return _initial_state(
         satellite,
         array(quaternion(rotation(scenario.initial.attitude))),
         array(scenario.initial.rate),
         array(scenario.units.gimbal_angles),
     )
+
+
+_initial_state = compiled_for_few_runs(initial_state)
 
 
 def _mount(site: Site, mount: str | None) -> Mount:
@@ -102,13 +105,14 @@ def _mount(site: Site, mount: str | None) -> Mount:
     return Mount(site.name, site.on, array(p), array(quaternion(base)), welded)
 
 
-@jax.jit
+@compiled_for_few_runs
 def _whole_inertia(satellite, gimbal_angle):
     """Inertia [kg m^2] of the whole satellite about its mass centre, bus axes.
 
-    All bodies in their nominal pose, gimbals at their angles at the start.
+    All bodies in their nominal pose, gimbals at their angles at the start, rotors balanced.
     """
     still = jnp.array([1.0, 0.0, 0.0, 0.0]), jnp.zeros(3)
+    satellite = balanced(satellite)
     state = initial_state(satellite, *still, gimbal_angle)
     whole = rigid_parts(satellite, jnp.zeros(()), state)
     r = whole.p - whole.mass @ whole.p / jnp.sum(whole.mass)

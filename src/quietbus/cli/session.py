@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -50,6 +51,7 @@ def keeping_results() -> Iterator[None]:
 
 def import_heavy() -> None:
     """JAX takes a second or two to load; say so."""
+    gc.disable()  # nothing of what is loaded is garbage
     if sys.stderr.isatty():
         with status() as tell:
             tell("loading JAX")
@@ -64,6 +66,8 @@ def import_heavy() -> None:
             "note: JAX_DISABLE_JIT is set, so nothing is compiled: a flight of 10 ms takes minutes",
             file=sys.stderr,
         )
+    gc.freeze()
+    gc.enable()
     # what is odd in a scenario has been told when it was read
     warnings.simplefilter("ignore", ImplausibleValue)
 

@@ -4,7 +4,6 @@ The same equations as for the rotors' orders (``dynamics.rotor_response``), with
 other frequencies (docs/theory.md, section 15).
 """
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Complex, Float
@@ -15,6 +14,7 @@ from quietbus.dynamics.views import View, linear_outputs, linear_outputs_with
 from quietbus.model.cluster import Cluster, on_axes
 from quietbus.model.disturbance import on_carrier
 from quietbus.model.satellite import Satellite
+from quietbus.programs import compiled
 from quietbus.spatial.vector import solve_small
 
 CROSS = "line_of_sight_cospectrum"
@@ -127,14 +127,14 @@ def _turning(cluster, small):
     return cluster.turning(now.t, now.around(cluster).own, rates_of(small.slow.rates, cluster).y)
 
 
-@eqx.filter_jit
+@compiled
 def noise_psd(satellite, small, frequency, view):
     """``noise_response`` at instants (leading axis of ``small``) and frequencies (second)."""
     at = lambda small: jax.vmap(lambda f: noise_response(satellite, small, f, view))(frequency)  # noqa: E731
     return jax.lax.map(at, small)
 
 
-@eqx.filter_jit
+@compiled
 def ripple_lines(satellite, small, view):
     """``ripple_response`` at instants (leading axis of ``small``)."""
     return jax.vmap(lambda small: ripple_response(satellite, small, view))(small)

@@ -32,13 +32,13 @@ from quietbus.dynamics.equations import Moving, accelerations, moving, rates_of
 from quietbus.dynamics.linear_model import LinearModel
 from quietbus.dynamics.outputs import joined
 from quietbus.dynamics.state import BodyState, State
-from quietbus.jaxconfig import compiled_for_few_runs
 from quietbus.model.control import Actuators
 from quietbus.model.element import Own
 from quietbus.model.report import AXIS
 from quietbus.model.satellite import BUS, CONTROL, Satellite
 from quietbus.model.steering import PseudoInverse, Steering
 from quietbus.model.unit import rotor_centres_P
+from quietbus.programs import compiled_for_few_runs
 from quietbus.spatial.rotation import (
     quaternion_conjugate,
     quaternion_multiply,
@@ -223,6 +223,7 @@ def input_rows(satellite: Satellite) -> Rows:
     return Rows(tuple(names for _, names in parts), tuple(key for key, _ in parts))
 
 
+@compiled_for_few_runs
 def _nominal(satellite: Satellite, gimbal_angle: Array) -> Pose:
     unit = jnp.array([1.0, 0.0, 0.0, 0.0])
     state = initial_state(satellite, unit, jnp.zeros(3), gimbal_angle)
@@ -416,7 +417,8 @@ def _at_equilibrium(satellite, rate, pose, points):
         *((kind, name) for name in pose.own for kind in ("q", "z")),
     )
     for _ in range(NEWTON_STEPS):
-        matrices, rates = jax.device_get(_derivatives(satellite, rate, pose, points))
+        *numbers, names = _derivatives(satellite, rate, pose, points)
+        matrices, rates = jax.device_get(numbers)
         unbalance = _against_bus(rows, free, pose, rates)
         if np.all(np.abs(unbalance) < 1e-11):
             break
@@ -427,23 +429,7 @@ def _at_equilibrium(satellite, rate, pose, points):
             step[6 * len(free) :],
         )
     _check_equilibrium(rates[rows.where(("rate", BUS))], unbalance)
-    names = _output_names(satellite, rate, pose, points)
     return tuple(np.array(matrix) for matrix in matrices), names
-
-
-def _output_names(satellite, rate, pose, points) -> tuple[str, ...]:
-    rows, inputs = state_rows(satellite, pose), input_rows(satellite)
-    x, u = jnp.zeros(len(rows.flat)), jnp.zeros(len(inputs.flat))
-    sizes: dict[str, int] = {}
-
-    def look():
-        _, outputs = _system(satellite, rate, pose, points, x, u)
-        sizes.update({name: len(value) for name, value in outputs.items()})
-
-    jax.eval_shape(look)
-    return tuple(
-        label for name, n in sizes.items() for label in (_axes(name) if n == 3 else (name,))
-    )
 
 
 @compiled_for_few_runs
@@ -476,17 +462,20 @@ def _against_bus(rows: Rows, free: list[str], pose: Pose, values: np.ndarray) ->
 
 @compiled_for_few_runs
 def _derivatives(satellite, rate, pose, points):
-    """A, B, C, D and dx/dt in a pose."""
+    """A, B, C, D and dx/dt in a pose, and the outputs' names."""
     averaged = satellite.averaged()
+    sizes: dict[str, int] = {}
 
     def system(x, u):
         rates, outputs = _system(averaged, rate, pose, points, x, u)
+        sizes.update({name: len(value) for name, value in outputs.items()})
         return (rates, jnp.concatenate(list(outputs.values()))), rates
 
     x = jnp.zeros(len(state_rows(satellite, pose).flat))
     u = jnp.zeros(len(input_rows(satellite).flat))
     ((A, B), (C, D)), rates = jax.jacfwd(system, argnums=(0, 1), has_aux=True)(x, u)
-    return (A, B, C, D), rates
+    names = (_axes(name) if n == 3 else (name,) for name, n in sizes.items())
+    return (A, B, C, D), rates, tuple(label for each in names for label in each)
 
 
 def platform_inertia(

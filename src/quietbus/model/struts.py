@@ -11,6 +11,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from quietbus.programs import compiled_for_few_runs
+
 
 class StrutTangent(NamedTuple):
     """Struts for small motion: tension ``k e + c e' + F z`` with ``z' = E e + R e' + Z z``."""
@@ -38,17 +40,6 @@ class AbstractStrut(eqx.Module):
         """Tension [N] at lengths [m] and their rates [m/s]."""
         raise NotImplementedError
 
-    def tangent(self, length: Float[Array, " leg"]) -> StrutTangent:
-        """For small motion about lengths at rest, with the memory of the start."""
-        z, still, one = self.start(), jnp.zeros_like(length), jnp.ones_like(length)
-        law = lambda length, rate: self.tension(length, rate, z)  # noqa: E731
-        at = (length, still)
-        k, c = jax.jvp(law, at, (one, still))[1], jax.jvp(law, at, (still, one))[1]
-        forces = jax.jacfwd(self.tension, argnums=2)(length, still, z)
-        return StrutTangent(
-            k, c, forces, *jax.jacfwd(self.memory_rate, argnums=(0, 1, 2))(length, still, z)
-        )
-
     def memory_rate(
         self, length: Float[Array, " leg"], rate: Float[Array, " leg"], z: Float[Array, " z"]
     ) -> Float[Array, " z"]:
@@ -66,6 +57,18 @@ class AbstractStrut(eqx.Module):
     ) -> Float[Array, ""]:
         """Power [W] that dampers take."""
         raise NotImplementedError
+
+
+@compiled_for_few_runs
+def tangent(strut: AbstractStrut, length: Float[Array, " leg"]) -> StrutTangent:
+    """Struts for small motion about lengths at rest, with the memory of the start."""
+    z, still, one = strut.start(), jnp.zeros_like(length), jnp.ones_like(length)
+    law = lambda length, rate: strut.tension(length, rate, z)  # noqa: E731
+    at = (length, still)
+    k, c = jax.jvp(law, at, (one, still))[1], jax.jvp(law, at, (still, one))[1]
+    forces = jax.jacfwd(strut.tension, argnums=2)(length, still, z)
+    memory = jax.jacfwd(strut.memory_rate, argnums=(0, 1, 2))(length, still, z)
+    return StrutTangent(k, c, forces, *memory)
 
 
 class SpringDamper(AbstractStrut):

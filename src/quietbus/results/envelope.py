@@ -1,9 +1,8 @@
 """Jitter over the whole of a run, where the pictures for paper show its end only."""
 
 import numpy as np
+import scipy  # which loads its parts when they are used
 import xarray as xr
-from scipy.ndimage import maximum_filter1d
-from scipy.signal import oaconvolve, resample_poly
 
 from quietbus.analysis.signals.residual import FINER
 from quietbus.results import aliasing, scenario_of
@@ -39,14 +38,14 @@ def jitter_over_time(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarra
     rates = degrees(run, "bus_rate")
     if not np.all(np.isfinite(rates)):
         raise ValueError("the bus rate has values that are not finite")
-    slow = oaconvolve(rates, _smoothing(half)[:, None], mode="valid", axes=0)
+    slow = scipy.signal.oaconvolve(rates, _smoothing(half)[:, None], mode="valid", axes=0)
     jitter = rates[half : len(time) - half] - slow
     slowest, _ = rotor_frequencies(run)
     span = min(TURNS / slowest, TREND) if slowest else 0.1
-    finer = (np.abs(resample_poly(line, FINER, 1)) for line in jitter.T)
+    finer = (np.abs(scipy.signal.resample_poly(line, FINER, 1)) for line in jitter.T)
     between = [line.reshape(-1, FINER).max(axis=1) for line in finer]
     inside = slice(_EDGE, -_EDGE)
-    envelope = maximum_filter1d(
+    envelope = scipy.ndimage.maximum_filter1d(
         np.column_stack(between)[inside], round(span / step) + 1, axis=0, mode="nearest"
     )
     return time[left:-left], jitter[inside], envelope, span

@@ -5,7 +5,6 @@ at some instants, so dense that the path of their configuration is straight in b
 interpolated.
 """
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -18,6 +17,7 @@ from quietbus.dynamics.state import State
 from quietbus.dynamics.vibration import Vibration, sampled_coefficients, vibration_with
 from quietbus.dynamics.views import NOTHING_SEEN, View
 from quietbus.model.satellite import Satellite
+from quietbus.programs import compiled
 
 SAMPLE_ERROR = 1e-5  # of a configuration between linearisations, in the shares that elements give
 INSTANTS = 128  # responses per call, so that one program serves start and run, which can be stopped
@@ -109,7 +109,7 @@ def nodes(path: np.ndarray, error: float) -> np.ndarray:
     return np.array(sorted(found))
 
 
-@eqx.filter_jit
+@compiled
 def _compiled_path(satellite, time, states):
     """What the sampled elements' equations depend on (n, c): configurations, and rates.
 
@@ -128,7 +128,7 @@ def _compiled_path(satellite, time, states):
     return jax.vmap(one)(time, states)
 
 
-@eqx.filter_jit
+@compiled
 def _compiled_samples(satellite, t, states):
     """The sampled coefficients as one row per instant."""
     averaged = satellite.averaged()
@@ -139,7 +139,7 @@ def _compiled_samples(satellite, t, states):
     return jax.vmap(one)(t, states)
 
 
-@eqx.filter_jit
+@compiled
 def _compiled_chunk(satellite, t, states, rows, view, one_speed):
     satellite, averaged = satellite.prepared(), satellite.averaged()
 

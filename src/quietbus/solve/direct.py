@@ -21,6 +21,7 @@ from quietbus.dynamics.closed_loop import state_rate, tidy
 from quietbus.dynamics.outputs import Outputs, geometry_margin, outputs
 from quietbus.dynamics.state import State
 from quietbus.model.satellite import Satellite
+from quietbus.programs import compiled
 from quietbus.solve.integrator import diffeqsolve
 from quietbus.solve.resolved_steps import ResolvingController, fastest_line
 
@@ -180,7 +181,7 @@ def _piece(satellite, state, t0, t1, step, ts, tolerances, scheme) -> _Piece:
     return jax.block_until_ready(_compiled_piece(satellite, state, arrays, scheme))
 
 
-@eqx.filter_jit
+@compiled
 def _compiled_piece(satellite, state, numbers, scheme) -> _Piece:
     t0, t1, step, ts, rtol, atol = numbers
     satellite = satellite.averaged() if scheme.averaged else satellite.prepared()

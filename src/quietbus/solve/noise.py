@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 import jax
 import jax.numpy as jnp
 import numpy as np
-import scipy.fft
-from scipy.integrate import trapezoid
+import scipy  # which loads its parts when they are used
 
 from quietbus.dynamics.disturbance_response import CROSS, noise_psd
 from quietbus.dynamics.vibration import Vibration
@@ -37,7 +36,7 @@ class Broadband:
 
         Linear in time between the looks.
         """
-        square = trapezoid(self.psd[name], self.frequency, axis=1).sum(axis=1)
+        square = np.trapezoid(self.psd[name], self.frequency, axis=1).sum(axis=1)
         flat = square.reshape(len(square), -1)
         at = [np.interp(np.arange(count), self.instants, column) for column in flat.T]
         return np.array(at).T.reshape(count, *square.shape[1:])

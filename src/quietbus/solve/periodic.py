@@ -16,6 +16,7 @@ from quietbus.dynamics.vibration import Vibration
 from quietbus.model.element import Own
 from quietbus.model.moments import ORDERS
 from quietbus.model.satellite import BUS, Satellite
+from quietbus.programs import compiled
 from quietbus.solve.along import at_one
 from quietbus.solve.validity import refuse_resonance
 from quietbus.spatial.rotation import (
@@ -118,7 +119,7 @@ def _answer_to_square(small: Vibration, square: Sequence[np.ndarray], speed: flo
     return Deviation(*map(jnp.asarray, sums))
 
 
-@eqx.filter_jit
+@compiled
 def _moved_by(satellite, state, small, xi):
     moved = _deviation(satellite, small, xi, rotors_at_start(satellite, state)[1])
     return displaced(state, small, moved)
@@ -134,7 +135,7 @@ def _jitter_at(satellite: Satellite, state: State) -> tuple[Vibration, np.ndarra
     return small, xi
 
 
-@eqx.filter_jit
+@compiled
 def _deviation(satellite, small, xi, phase):
     """Jitter xi (cmg, order, m) at rotor angles."""
     ny = small.memory.layout.driven
@@ -151,7 +152,7 @@ def _deviation(satellite, small, xi, phase):
     return jax.tree.map(lambda part: jnp.sum(part.real, axis=(0, 1)), moved)
 
 
-@eqx.filter_jit
+@compiled
 def _jitter_squared(satellite, state, small, xi, chosen, base, turns):
     """What rates have beyond first order in some lines, at equally spaced angles of a turn.
 

@@ -35,11 +35,11 @@ from quietbus.arguments import count as whole
 from quietbus.build import build_satellite
 from quietbus.dynamics.rotor_response import orders_of
 from quietbus.dynamics.vibration import Vibration
-from quietbus.jaxconfig import compiled_for_few_runs
 from quietbus.model.moments import ORDERS
 from quietbus.model.satellite import Satellite
 from quietbus.model.variants import with_rotor_speed
 from quietbus.plain import ARCSEC, json_ready
+from quietbus.programs import compiled, compiled_for_few_runs
 from quietbus.scenario import Scenario, ScenarioError
 from quietbus.solve.noise import Broadband, noise_at, noisy
 from quietbus.solve.validity import ResonanceError, refuse_resonance
@@ -255,7 +255,7 @@ class JitterStudy:
     ) -> tuple[dict[str, np.ndarray], Vibration]:
         own = self.satellite(mount)
         speed = np.asarray(own.rotor_speed)
-        designs = [with_rotor_speed(own, jnp.asarray(factor * speed)) for factor in factors]
+        designs = [with_rotor_speed(own, factor * speed) for factor in factors]
         return _compute(
             designs, np.broadcast_to(self.gimbal_angle, (len(designs), len(self.gimbal_angle)))
         )
@@ -452,7 +452,7 @@ def _compute(
     return for_designs(_compiled_designs, designs, angles)
 
 
-@eqx.filter_jit
+@compiled
 def _compiled_designs(satellites, angles):
     return eqx.filter_vmap(steady_jitter)(satellites, jnp.asarray(angles))
 

@@ -15,11 +15,11 @@ from quietbus.dynamics.invariants import (
     linear_momentum_N,
 )
 from quietbus.dynamics.state import State
-from quietbus.jaxconfig import compiled_for_few_runs
 from quietbus.model.body import body_quantities
 from quietbus.model.disturbance import quiet_rotors
 from quietbus.model.satellite import BUS, Satellite
 from quietbus.model.variants import with_clusters, without_disturbance
+from quietbus.programs import compiled_for_few_runs
 from quietbus.reference.motion import Motion
 from quietbus.solve.direct import Scheme, Solution, Tolerances, integrate
 from quietbus.validate.subject import Check, Subject, apart

@@ -11,11 +11,11 @@ from quietbus.analysis.jitter.lines import AT_REST, rest_error, steady_jitter_on
 from quietbus.dynamics.rotor_response import orders_of
 from quietbus.dynamics.state import State
 from quietbus.dynamics.vibration import Vibration
-from quietbus.jaxconfig import compiled_for_few_runs
 from quietbus.model.body import body_quantities
 from quietbus.model.gimbal_motor import SmoothMotor
 from quietbus.model.rotors import RunUp
 from quietbus.model.satellite import BUS, Satellite
+from quietbus.programs import compiled_for_few_runs
 from quietbus.reference.platforms import blocks
 from quietbus.reference.units import unit_data
 from quietbus.solve.direct import SLOW, Tolerances

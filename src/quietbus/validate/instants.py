@@ -10,8 +10,8 @@ from jaxtyping import Array
 from quietbus.dynamics.closed_loop import evaluate, state_rate
 from quietbus.dynamics.outputs import outputs
 from quietbus.dynamics.rotor_response import orders_of
-from quietbus.jaxconfig import compiled_for_few_runs
 from quietbus.model.satellite import CONTROL, Satellite
+from quietbus.programs import compiled_for_few_runs
 from quietbus.reference.motion import Motion
 from quietbus.reference.satellite import Instant
 from quietbus.validate.motions import random_motion, random_times

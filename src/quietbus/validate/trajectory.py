@@ -33,6 +33,7 @@ from quietbus.model.variants import (
     without_leg_mass,
     without_rotation,
 )
+from quietbus.programs import compiled
 from quietbus.reference.engine import import_mujoco, model_of
 from quietbus.reference.mechanism import Mechanism
 from quietbus.reference.mjcf import ARMATURE
@@ -95,7 +96,7 @@ def lossless(satellite: Satellite) -> Satellite:
     return held_gimbals(without_rotation(without_friction(undamped)))
 
 
-@eqx.filter_jit
+@compiled
 def fly(
     satellite: Satellite, state: State, times: Float[Array, " time"], tolerance: float = 1e-12
 ) -> State:

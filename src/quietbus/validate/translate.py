@@ -14,11 +14,11 @@ from jaxtyping import Array, Float
 from quietbus.dynamics.closed_loop import attitudes
 from quietbus.dynamics.equations import moving, rates_of
 from quietbus.dynamics.state import BodyState, State
-from quietbus.jaxconfig import compiled_for_few_runs
 from quietbus.model.cluster import Units
 from quietbus.model.element import Own, Rates
 from quietbus.model.satellite import BUS, CONTROL, Satellite
 from quietbus.model.struts import SpringDamper
+from quietbus.programs import compiled_for_few_runs
 from quietbus.reference import units as reference_units
 from quietbus.reference.body import Body
 from quietbus.reference.mechanism import LegParts, Legs, Mechanism

@@ -19,9 +19,9 @@ from quietbus.analysis.jitter.lines import at_rest, for_designs
 from quietbus.dynamics.coefficients import SlowMotion, coefficients
 from quietbus.dynamics.rotor_response import orders_of, rotor_forces, rotor_speeds
 from quietbus.dynamics.vibration import Vibration, vibration
-from quietbus.jaxconfig import compiled_for_few_runs
 from quietbus.model.satellite import BUS, Satellite
 from quietbus.model.variants import with_mount
+from quietbus.programs import compiled, compiled_for_few_runs
 
 
 class HeldPlatform(eqx.Module):
@@ -166,7 +166,7 @@ def filtered_jitter_of_designs(
     return for_designs(_compiled, designs, angles)
 
 
-@eqx.filter_jit
+@compiled
 def _compiled(satellites, angles):
     return eqx.filter_vmap(filtered_jitter)(satellites, jnp.asarray(angles))
 

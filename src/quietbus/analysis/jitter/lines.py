@@ -15,11 +15,11 @@ from quietbus.dynamics.coefficients import SlowMotion, slow_motion
 from quietbus.dynamics.rotor_response import rotor_outputs
 from quietbus.dynamics.vibration import Vibration, vibration
 from quietbus.dynamics.views import NOTHING_SEEN, View
-from quietbus.jaxconfig import compiled_for_few_runs
 from quietbus.model import variants
 from quietbus.model.cluster import Cluster
 from quietbus.model.satellite import Satellite
 from quietbus.model.unit import balanced
+from quietbus.programs import compiled_for_few_runs
 
 Result = TypeVar("Result")
 AT_REST = 1e-6  # [m/s^2, rad/s^2] accelerations smaller than this are none
@@ -69,6 +69,7 @@ KINDS = (
 )
 
 
+@compiled_for_few_runs
 def imbalance_kinds(satellite: Satellite) -> list[Satellite]:
     """The satellite with static imbalance only, dynamic only, and both without installation error.
 
@@ -143,12 +144,17 @@ def for_designs(
     for start in range(0, len(designs), SEARCHED):
         these = list(designs[start : start + SEARCHED])
         missing = SEARCHED - len(these)
-        stacked = jax.tree.map(
-            lambda *each: np.stack(each) if eqx.is_array(each[0]) else each[0],
-            *these,
-            *these[-1:] * missing,
-        )
+        stacked = jax.tree.map(_stacked, *these, *these[-1:] * missing)
         at = np.pad(angles[start : start + SEARCHED], ((0, missing), (0, 0)), mode="edge")
         part = program(stacked, at)
         parts.append(jax.tree.map(lambda leaf: np.asarray(leaf)[: len(these)], part))  # noqa: B023
     return jax.tree.map(lambda *each: np.concatenate(each), *parts)
+
+
+def _stacked(*each: Any) -> Any:
+    """A leaf of many designs along a first axis; what all share is not copied."""
+    if not eqx.is_array(each[0]):
+        return each[0]
+    if all(leaf is each[0] for leaf in each):
+        return np.broadcast_to(np.asarray(each[0]), (len(each), *np.shape(each[0])))
+    return np.stack(each)

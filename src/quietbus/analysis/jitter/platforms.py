@@ -24,10 +24,10 @@ from quietbus.dynamics.linearize import (
 )
 from quietbus.dynamics.rotor_response import orders_of
 from quietbus.dynamics.vibration import Vibration, actuator_reactions
-from quietbus.jaxconfig import compiled_for_few_runs
 from quietbus.model.satellite import BUS, Satellite
 from quietbus.model.together import together
 from quietbus.model.variants import with_base_fixed, with_mount
+from quietbus.programs import compiled_for_few_runs
 
 MOUNTS = ("isolated", "rigid")
 

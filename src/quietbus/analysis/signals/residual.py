@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import resample_poly
+import scipy  # which loads its parts when they are used
 
 from quietbus.analysis.signals.spectrum import detrended
 
@@ -51,7 +51,7 @@ def residual(time: np.ndarray, signal: np.ndarray, window: float = 1.0) -> Resid
     jitter = detrended(t, values)
     slow = values - jitter
     middle = np.abs(np.linspace(-1.0, 1.0, len(t))) <= 0.5
-    fine = resample_poly(jitter, FINER, 1)[: FINER * (len(t) - 1) + 1]
+    fine = scipy.signal.resample_poly(jitter, FINER, 1)[: FINER * (len(t) - 1) + 1]
     between = np.abs(np.linspace(-1.0, 1.0, len(fine))) <= 0.5
     return Residual(
         window=(float(t[middle][0]), float(t[middle][-1])),

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import periodogram, windows
+import scipy  # which loads its parts when they are used
 
 # Flat-top window HFT116D (Heinzel, Ruediger, Schilling 2002): a line between two bins reads at most
 # 0.03 % low, and leakage of slow motion falls by 18 dB an octave from -117 dB.
@@ -57,10 +57,10 @@ def amplitude_spectrum(time: np.ndarray, signal: np.ndarray) -> Spectrum:
     steps = np.diff(time)
     if np.ptp(steps) > 1e-3 * steps[0]:
         raise ValueError("the samples are not evenly spaced in time")
-    frequency, power = periodogram(
+    frequency, power = scipy.signal.periodogram(
         detrended(time, signal),
         (len(time) - 1) / (time[-1] - time[0]),
-        windows.general_cosine(len(time), _FLAT_TOP, sym=False),
+        scipy.signal.windows.general_cosine(len(time), _FLAT_TOP, sym=False),
         detrend=False,
         scaling="spectrum",  # mean square of a line: A^2 / 2, but A^2 at both ends of the scale
         axis=0,

@@ -17,7 +17,7 @@ from quietbus.model.legs.joints import joint_forces
 from quietbus.model.legs.kinematics import Geometry, LegMotion, leg_motion
 from quietbus.model.legs.rigid_parts import joint_motion, leg_rigid_parts
 from quietbus.model.report import AXIS, LEG, Output, Quantity
-from quietbus.model.struts import AbstractStrut, StrutTangent
+from quietbus.model.struts import AbstractStrut, StrutTangent, tangent
 
 STROKE = Quantity("leg_stroke", LEG, "m", "leg length less its nominal length", vibrates=True)
 FORCE = Quantity("leg_force", LEG, "N", "force of the strut, tension positive", vibrates=True)
@@ -80,7 +80,7 @@ class Hexapod(AbstractElement):
     @property
     def tangent(self) -> StrutTangent:
         """The struts for small motion about their nominal lengths."""
-        return self.strut.tangent(self.geometry.nominal_length)
+        return tangent(self.strut, self.geometry.nominal_length)
 
     def mass(self, around):
         return leg_mass_matrix(self.bodies, self.motion(around))
