@@ -1,5 +1,6 @@
 """`quietbus analyze`: JSON with the promised keys, tables, pictures, exit codes."""
 
+import copy
 import json
 import subprocess
 import sys
@@ -9,8 +10,12 @@ import pytest
 from matplotlib.figure import Figure
 
 import quietbus as qb
+from oracles.scenarios import mixed, payload
 from quietbus import cli
+from quietbus.cli.given import load
 from quietbus.plots import analysis_figures
+from quietbus.scenario import load_scenario
+from quietbus.scenario.text import write_yaml
 
 FIGURES = {
     "bode",
@@ -119,11 +124,65 @@ def test_pictures_without_control_say_so():
     assert len(figures["modes"].axes) == 12
 
 
+def two_clusters():
+    """Two groups of CMGs."""
+    data = mixed()
+    return data | {"cluster": [data["cluster"][0], copy.deepcopy(data["cluster"][0])]}
+
+
+def wheels():
+    """Reaction wheels alone."""
+    return load_scenario("wheels-demo").to_dict()
+
+
 def test_gimbal_angles_may_have_units(capsys):
     angles = "--gimbal-angles", "30 deg, -30 deg, 0.1, 0"
     code, out, _ = run("zhang2012", "--json", *angles, capsys=capsys)
     assert code == 0
     assert json.loads(out)["gimbal_angle"] == pytest.approx([0.5235988, -0.5235988, 0.1, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("make", "paths"),
+    [
+        (mixed, {"cluster[0]": [0.5, -0.5, 0.1, 0.2]}),
+        (payload, {"cluster": [0.5, -0.5, 0.1, 0.2]}),
+        (two_clusters, {"cluster[0]": [0.5, -0.5, 0.1, 0.2], "cluster[1]": [0.3, 0.4, 0.6, 0.7]}),
+    ],
+)
+def test_gimbal_angles_are_of_all_cmgs_in_their_order(make, paths, tmp_path):
+    file = tmp_path / "own.yaml"
+    file.write_text(write_yaml(make()))
+    angles = [angle for own in paths.values() for angle in own]
+    said = ", ".join(f"{angle} rad" for angle in angles)
+    scenario = load(str(file), None, None, gimbal_angles=said)
+    of_blocks = {path: block.gimbal_angles for path, block in scenario.sites[0].blocks_at}
+    for path, own in paths.items():
+        assert of_blocks[path] == pytest.approx(own)
+    turning = scenario.units.turning
+    assert scenario.units.gimbal_angles[turning] == pytest.approx(angles)
+    assert not scenario.units.gimbal_angles[~turning].any()
+
+
+@pytest.mark.parametrize(
+    ("make", "said", "message"),
+    [
+        (two_clusters, "1, 2, 3", "expected 8 angles, one for each CMG (4 of cluster[0], 4 of"),
+        (
+            two_clusters,
+            "1, 2, 3, 4, 5, 6, 7, 8 m",
+            "with --gimbal-angles: cluster[1].gimbal",
+        ),
+        (mixed, "1, 2, 3", "cluster[0].gimbal_angles"),
+        (wheels, "1, 2, 3", "--gimbal-angles: expected none, since no unit has a gimbal"),
+    ],
+)
+def test_wrong_gimbal_angles_of_groups_name_the_option(make, said, message, tmp_path, capsys):
+    file = tmp_path / "own.yaml"
+    file.write_text(write_yaml(make()))
+    code, _, err = run(str(file), "--gimbal-angles", said, "--json", capsys=capsys)
+    assert code == 2
+    assert message in " ".join(err.split())
 
 
 @pytest.mark.parametrize(

@@ -70,6 +70,18 @@ def test_numbers_are_arguments_and_structure_is_not(traced):
     assert len(traced) == 2
 
 
+@pytest.mark.usefixtures("folder")
+def test_arguments_that_are_not_used_are_told_apart(traced):
+    def doubled(*each):
+        return 2.0 * each[0]
+
+    doubled.__module__ = "quietbus.tests"
+    for args in ((1.0,), (1.0, 5.0), (1.0, 5.0, 6.0), (1.0, 5.0)):
+        found = Program(doubled, dict)(*map(np.array, args))
+        np.testing.assert_array_equal(found, 2.0)
+    assert len(traced) == 3
+
+
 @pytest.mark.parametrize("kind", ["*.program", "*/*"])
 @pytest.mark.parametrize(
     "damage",

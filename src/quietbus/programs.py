@@ -121,7 +121,8 @@ class Program:
             return [leaf for leaf in jax.tree.leaves(out) if eqx.is_array(leaf)]
 
         flat.__name__ = self._function.__name__
-        lowered = jax.jit(flat, **self._options()).lower(*arrays)
+        # with what is not used too, so that what is compiled tells its arguments
+        lowered = jax.jit(flat, keep_unused=True, **self._options()).lower(*arrays)
         if entry is None:
             return lowered.compile(), answer
         digest = hashlib.sha256(repr(sorted(self._options().items())).encode())

@@ -1,8 +1,41 @@
 """Scenarios that use as much of the file format as they can, for checks between programs."""
 
+import copy
+
 import numpy as np
 
 import quietbus as qb
+from quietbus.scenario import load_scenario
+
+ZHANG = load_scenario("zhang2012").to_dict()
+CMGS, WHEELS = ZHANG["cluster"], load_scenario("wheels-demo").to_dict()["cluster"]
+PLATFORM = {"isolator": ZHANG["isolator"], "cluster": CMGS}
+BENCH = {key: value for key, value in ZHANG["isolator"].items() if key != "plate"}
+BODY = {"mass": 30, "inertia": [[2, 0, 0], [0, 2, 0], [0, 0, 3]], "center_of_mass": [0, 0, 0.1]}
+
+
+def mixed() -> dict:
+    """CMGs and reaction wheels on one plate."""
+    return copy.deepcopy(ZHANG | {"cluster": [CMGS, WHEELS]})
+
+
+def two() -> dict:
+    """CMGs on one platform, wheels on another."""
+    rest = {key: value for key, value in ZHANG.items() if key not in PLATFORM}
+    south = {"offset": [0.8, 0.0, 0.6], "orientation": [0.0, 0.3, 0.2]}
+    platforms = [
+        {"name": "north", **PLATFORM},
+        {"name": "south", "isolator": ZHANG["isolator"] | south, "cluster": WHEELS},
+    ]
+    # nothing in common, so that a change of one is none of the other
+    return copy.deepcopy(rest) | {"platforms": [copy.deepcopy(each) for each in platforms]}
+
+
+def payload() -> dict:
+    """The paper's satellite with a camera on a bench of its own."""
+    bench = {"body": BODY, "isolator": BENCH | {"offset": [0, 0, -1.2]}}
+    lines = {"camera": {"direction": [1, 0, 0]}, "tracker": {"direction": [0, 1, 0], "on": "bus"}}
+    return copy.deepcopy(ZHANG | {"payload": bench, "lines_of_sight": lines})
 
 
 def awkward_scenario() -> qb.Scenario:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import sys
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import typer
 
@@ -51,7 +52,7 @@ DurationOption = Annotated[
 
 AnglesOption = Annotated[
     str | None,
-    typer.Option(help="'30 deg, -30 deg, ...' (or rad), instead of the scenario's."),
+    typer.Option(help="'30 deg, -30 deg, ...' (or rad) of all CMGs, instead of the scenario's."),
 ]
 
 
@@ -76,11 +77,11 @@ class Asked:
 
         if error.source not in cls.names:
             return error
-        by_option = [
+        by_option = dict.fromkeys(
             option
             for path, option in cls.options.items()
             if any(dotted(problem.path).startswith(path) for problem in error.problems)
-        ]
+        )
         if by_option:
             return ScenarioError(f"{cls.file} with {', '.join(by_option)}", error.problems)
         return located(error, cls.file)
@@ -97,14 +98,16 @@ def load(
     from quietbus.scenario import load_scenario
     from quietbus.scenario.plausibility import implausible
 
-    angles = gimbal_angles and [angle.strip() for angle in gimbal_angles.split(",")]
-    given = {
+    given: dict[str, tuple[str, Any]] = {
         "simulation.duration": ("--duration", duration),
         "simulation.output_rate": ("--output-rate", output_rate),
-        "cluster.gimbal_angles": ("--gimbal-angles", angles),
     }
     given = {path: said for path, said in given.items() if said[1] is not None}
     scenario = load_scenario(name)
+    if gimbal_angles is not None:
+        angles = [angle.strip() for angle in gimbal_angles.split(",")]
+        for path, own in _of_blocks(scenario, angles).items():
+            given[path] = ("--gimbal-angles", own)
     Asked.file, Asked.names = name, (scenario.name, f"{scenario.name} with overrides")
     Asked.options = {path: option for path, (option, _) in given.items()}
     scenario = scenario.with_overrides({path: value for path, (_, value) in given.items()})
@@ -113,6 +116,31 @@ def load(
     for note in implausible(scenario):
         print(f"note: {note}", file=sys.stderr)
     return scenario
+
+
+def _of_blocks(scenario: Scenario, angles: list[str]) -> dict[str, list[str]]:
+    """Angles of all CMGs, through all platforms and blocks in their order, by path."""
+    from quietbus.scenario.blocks import Blocks
+
+    blocks = [
+        (f"{path}.gimbal_angles", block.count)
+        for site in scenario.sites
+        for path, block in site.blocks_at
+        if Blocks((block,)).gimbals_turn
+    ]
+    if not blocks:
+        raise BadInput("--gimbal-angles: expected none, since no unit has a gimbal")
+    if len(blocks) == 1:
+        return {blocks[0][0]: angles}
+    count = sum(own for _, own in blocks)
+    if len(angles) != count:
+        each = ", ".join(f"{own} of {path.removesuffix('.gimbal_angles')}" for path, own in blocks)
+        raise BadInput(
+            f"--gimbal-angles: expected {count} angles, one for each CMG ({each}), "
+            f"got {len(angles)}"
+        )
+    ends = itertools.accumulate(own for _, own in blocks)
+    return {path: angles[end - own : end] for (path, own), end in zip(blocks, ends, strict=True)}
 
 
 def speed(text: str) -> float:

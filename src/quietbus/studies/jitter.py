@@ -15,7 +15,6 @@ from quietbus.analysis.jitter.combine import Combined, combine
 from quietbus.analysis.jitter.lines import (
     AT_REST,
     KINDS,
-    SEARCHED,
     budget,
     for_designs,
     imbalance_kinds,
@@ -29,7 +28,7 @@ from quietbus.analysis.jitter.sweep import (
     bearing_modes,
     critical_speeds,
 )
-from quietbus.analysis.jitter.worst import WorstAngles, worst_angles
+from quietbus.analysis.jitter.worst import SEARCHED, WorstAngles, worst_angles
 from quietbus.arguments import choice, listing, positive
 from quietbus.arguments import count as whole
 from quietbus.build import build_satellite

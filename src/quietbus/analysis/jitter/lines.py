@@ -125,7 +125,7 @@ def budget(
     )
 
 
-SEARCHED = 64  # sets of gimbal angles, or designs, looked at together
+TOGETHER = 16  # designs that a program looks at together: one alone costs as much
 
 
 def for_designs(
@@ -136,16 +136,16 @@ def for_designs(
     """What a program gives for many satellites alike but for their numbers, compiled once.
 
     Args:
-        program: compiled; from SEARCHED satellites, stacked, and their (SEARCHED, cmg) angles.
+        program: compiled; from TOGETHER satellites, stacked, and their (TOGETHER, cmg) angles.
         designs: any number of satellites.
         angles: (design, cmg) [rad].
     """
     parts = []
-    for start in range(0, len(designs), SEARCHED):
-        these = list(designs[start : start + SEARCHED])
-        missing = SEARCHED - len(these)
+    for start in range(0, len(designs), TOGETHER):
+        these = list(designs[start : start + TOGETHER])
+        missing = TOGETHER - len(these)
         stacked = jax.tree.map(_stacked, *these, *these[-1:] * missing)
-        at = np.pad(angles[start : start + SEARCHED], ((0, missing), (0, 0)), mode="edge")
+        at = np.pad(angles[start : start + TOGETHER], ((0, missing), (0, 0)), mode="edge")
         part = program(stacked, at)
         parts.append(jax.tree.map(lambda leaf: np.asarray(leaf)[: len(these)], part))  # noqa: B023
     return jax.tree.map(lambda *each: np.concatenate(each), *parts)

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import differential_evolution
 from scipy.stats import qmc
 
-from quietbus.analysis.jitter.lines import SEARCHED
+SEARCHED = 64  # sets of gimbal angles looked at together
 
 
 @dataclass(frozen=True)
