@@ -83,9 +83,22 @@ def save_figures(
         names[f"{name}~{alike + 1}" if alike else name] = None
     paths = [folder / f"{name}{suffix}" for name in names]
     for path, figure in zip(paths, figures.values(), strict=True):
-        with replacing(path, f"{suffix} picture") as file:
+        with replacing(path, f"{suffix} picture") as file, _laid_out(figure):
             figure.savefig(file, format=suffix[1:])
     return paths
+
+
+@contextlib.contextmanager
+def _laid_out(figure: Figure) -> Iterator[None]:
+    """With all in its place, which saving would find out by drawing the figure once for nothing."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+        figure.set_layout_engine("none")
+    try:
+        yield
+    finally:
+        figure.set_layout_engine(engine)
 
 
 def envelope(
