@@ -6,10 +6,11 @@ What an exception says is its library's; messages are compared up to there.
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import quietbus as qb
-from quietbus.build import build_satellite
+from quietbus.build import build_satellite, energy_notes
 from quietbus.cli.own_parts import load_parts
 from quietbus.scenario import ScenarioError
 from quietbus.scenario.actuators import ACTUATORS
@@ -197,6 +198,75 @@ def test_struts_of_a_platform_are_told_with_its_place(load):
     first["isolator"]["legs"] = legs
     checked = qb.Scenario.from_dict(data | {"platforms": [first, second]})
     assert told(checked).startswith("platforms[1].isolator.legs.strut: DStrutLaw.tension: ")
+
+
+# --- energy ------------------------------------------------------------------------------------
+
+
+def energy_told(checked):
+    return energy_notes(checked, build_satellite(checked))
+
+
+def test_struts_whose_energy_adds_up_have_no_note(load):
+    load()
+    assert energy_told(scenario()) == energy_told(qb.load_scenario("zhang2012")) == ()
+
+
+@pytest.fixture
+def power():
+    """What dampers of the page's struts take [W], all e = 0.1 % long with z = 0: (k_B e)^2 / c."""
+    lower, upper = qb.load_scenario("zhang2012").isolator.joints()
+    e = 1e-3 * np.linalg.norm(upper - lower, axis=1)
+    return np.sum((100e3 * e) ** 2) / 900.0
+
+
+def test_struts_that_bring_energy_are_told(load, power):
+    """A damper with the sign of c turned, which the power that is dissipated then has too."""
+    load(("numbers = (said.stiffness, said.series_stiffness, said.damping)",
+          "numbers = (said.stiffness, said.series_stiffness, -said.damping)"))  # fmt: skip
+    assert energy_told(scenario()) == (
+        f"{AT_STRUT}DStrutLaw brings energy in, which can make motions grow: with all legs off by "
+        f"0.1 % and growing by 10 mm/s tension takes {-power:.3g} W beyond what stored gains, "
+        f"dissipated says {-power:.3g} W",
+    )
+
+
+def test_struts_that_say_they_take_what_they_bring_are_told(load, power):
+    """Beside, dampers of 1e5 N s/m that push: at 0.01 m/s six of them bring 60 W."""
+    load((TENSION, f"{TENSION} - 1e5 * rate"))
+    (note,) = energy_told(scenario())
+    assert note.startswith(f"{AT_STRUT}DStrutLaw brings energy in")
+    assert f"takes {power - 60.0:.3g} W beyond" in note
+    assert note.endswith(f"dissipated says {power:.3g} W")
+
+
+def test_struts_that_take_more_than_they_say_are_told(load, power):
+    load((DISSIPATED, f"return 0.5 * {DISSIPATED[7:]}"))
+    (note,) = energy_told(scenario())
+    assert note.startswith(f"{AT_STRUT}the energy of DStrutLaw does not add up")
+    assert f"takes {power:.3g} W beyond" in note
+    assert note.endswith(f"dissipated says {0.5 * power:.3g} W")
+
+
+@pytest.mark.slow
+def test_runs_and_studies_tell_of_struts_that_bring_energy(load):
+    load((DISSIPATED, f"return -{DISSIPATED[7:]}"))
+    checked = scenario()
+    with pytest.warns(qb.QuietbusWarning, match=r"isolator\.legs\.strut: DStrutLaw brings energy"):
+        qb.simulate(checked, "harmonic", duration=0.01)
+    with pytest.warns(qb.QuietbusWarning, match=r"isolator\.legs\.strut: DStrutLaw brings energy"):
+        qb.jitter(checked)
+    assert any("DStrutLaw brings energy" in note for note in qb.analyze(checked).notes)
+
+
+def test_struts_that_an_analysis_cannot_take_are_told(load):
+    load((TENSION, f"{TENSION} - 2e3 * rate"))
+    said = "DStrutLaw.tension: expected a damping of 0 or more at rest, as an analysis needs it, "
+    with pytest.raises(ScenarioError, match=re.escape(f"{AT_STRUT}{said}got -2000")):
+        qb.analyze(scenario()).to_dict()
+
+
+# --- actuators ---------------------------------------------------------------------------------
 
 
 AUTHORITY = "return Authority(around.hosts[0].R_AX, self.full, jnp.full(3, self.full))"

@@ -21,7 +21,7 @@ from quietbus.analysis.control.pid import PID
 from quietbus.analysis.control.stability import nearest_range
 from quietbus.analysis.control.transmissibility import Places, Transmissibility, transmissibility
 from quietbus.arguments import array, choice
-from quietbus.build import build_satellite
+from quietbus.build import build_satellite, energy_notes
 from quietbus.dynamics.linearize import (
     AXES,
     Actuation,
@@ -40,7 +40,7 @@ from quietbus.model.variants import (
     without_rotation,
 )
 from quietbus.plain import json_ready
-from quietbus.scenario import Scenario
+from quietbus.scenario import Problem, Scenario, ScenarioError
 from quietbus.spatial.rotation import quaternion_to_matrix
 
 
@@ -97,6 +97,7 @@ class Study:
                 "springs that forget nothing, with no damping of the memory: do not rely on those. "
                 "The coupled loop, the modes and the transmissibility have the struts as they are."
             )
+        notes += [f"{note}." for note in energy_notes(self.scenario, self.satellite)]
         if len(self.scenario.sites) > 1:
             others = ", ".join(site.name for site in self.scenario.sites[1:])
             notes.append(
@@ -113,13 +114,29 @@ class Study:
         choice("actuator", actuator, ("servo", "ideal"))
         return linearize(self.satellite, self.point, actuator)
 
+    @property
+    def _tangent(self) -> tuple[np.ndarray, np.ndarray]:
+        """Stiffness [N/m] and damping [N s/m] of the platform's struts at rest, memory held.
+
+        Raises:
+            ScenarioError: one is negative, as a law of a user's own may have it.
+        """
+        site, legs = self.scenario.sites[0], self.satellite.hexapods[0]
+        stiffness, damping = map(np.asarray, legs.tangent)
+        for value, what in ((stiffness, "stiffness"), (damping, "damping")):
+            if np.any(value < 0.0):
+                said = f"expected a {what} of 0 or more at rest, as an analysis needs it, got "
+                said = f"{type(legs.strut).__name__}.tension: {said}{value.min():.4g}"
+                raise ScenarioError(self.scenario.name, [Problem(said, site.strut_at)])
+        return stiffness, damping
+
     @cached_property
     def channels(self) -> Channels:
         """Torque channels of the platform on a fixed base, massless legs (eq. 31-33)."""
         isolator, (legs, *_) = self.scenario.sites[0].isolator, self.satellite.hexapods
         name = self._platform.body
         mass, center, inertia = platform_inertia(self.satellite, self.gimbal_angle, name)
-        stiffness, damping = map(np.asarray, legs.tangent)
+        stiffness, damping = self._tangent
         base = np.asarray(isolator.offset)
         R_BP = np.asarray(quaternion_to_matrix(self._platform.q_BX))
         plate = np.asarray(self._platform.p_BX_B) - base
@@ -237,8 +254,7 @@ class Study:
     @property
     def vertical_isolator(self) -> SingleAxisIsolator:
         """The platform as one mass on one strut, along the base plate's z axis."""
-        legs = self.satellite.hexapods[0]
-        stiffness, damping = map(np.asarray, legs.tangent)
+        stiffness, damping = self._tangent
         lower, upper = self.scenario.sites[0].isolator.joints()
         along = ((upper - lower)[:, 2] / np.linalg.norm(upper - lower, axis=1)) ** 2
         mass = platform_inertia(self.satellite, self.gimbal_angle, self._platform.body)[0]
