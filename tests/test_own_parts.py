@@ -200,6 +200,15 @@ def test_struts_of_a_platform_are_told_with_its_place(load):
     assert told(checked).startswith("platforms[1].isolator.legs.strut: DStrutLaw.tension: ")
 
 
+def test_a_quantity_where_a_part_has_a_plain_number_is_told(load):
+    load(("    torque: Torque  # that one can give", "    torque: float"))
+    with pytest.raises(ScenarioError) as caught:
+        scenario(actuators={"rods": RODS | {"torque": "0.5 N*m"}})
+    said = "expected a number without a unit, as its type has no Measure, got '0.5 N*m'"
+    assert str(caught.value) == f"<data>: actuators.rods.torque: {said}"
+    assert build_satellite(scenario()).actuators[1].full == 0.5
+
+
 # --- energy ------------------------------------------------------------------------------------
 
 
