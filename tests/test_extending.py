@@ -114,6 +114,26 @@ def test_a_file_of_parts_may_be_called_as_a_library_is(folder):
     assert any("struts have memory" in note for note in json.loads(told)["notes"])
 
 
+@pytest.mark.parametrize("command", ["simulate", "jitter", "analyze"])
+def test_a_law_that_is_wrong_is_told_in_one_line(folder, command):
+    """With the line of the scenario, whichever command builds the model."""
+    law = folder / "wrong_law.py"
+    law.write_text((folder / "own_parts.py").read_text().replace("def stored(", "def store("))
+    done = subprocess.run(
+        [sys.executable, "-m", "quietbus", "--parts", law.name, command, "my.yaml"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    said = "DStrutLaw.stored: expected the law to have this method, got none"
+    told = [line for line in done.stderr.splitlines() if line.startswith("quietbus: ")]
+    assert len(told) == 1
+    assert re.fullmatch(rf"quietbus: my\.yaml: isolator\.legs\.strut \(line \d+\): {said}", told[0])
+    assert "Traceback" not in done.stderr
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -20,7 +20,7 @@ from quietbus.asked import (
     task_asked,
     tell_implausible,
 )
-from quietbus.build import build_satellite
+from quietbus.build import build_satellite, energy_notes
 from quietbus.dynamics.linear_model import LinearModel
 from quietbus.dynamics.linearize import Actuation, OperatingPoint
 from quietbus.dynamics.linearize import linearize as linearize_satellite
@@ -215,7 +215,10 @@ def jitter(scenario: Scenario | str, gimbal_angle: ArrayLike | None = None) -> J
     """
     scenario = scenario_asked(scenario)
     tell_implausible(scenario)
-    return JitterStudy(scenario, angles_asked(scenario, gimbal_angle))
+    study = JitterStudy(scenario, angles_asked(scenario, gimbal_angle))
+    for note in energy_notes(scenario, study.satellite("isolated")):
+        warnings.warn(note, QuietbusWarning, stacklevel=2)
+    return study
 
 
 def platforms(

@@ -10,8 +10,11 @@ from quietbus.model.element import AbstractActuator as AbstractActuator
 from quietbus.model.element import AbstractElement as AbstractElement
 from quietbus.model.element import Around as Around
 from quietbus.model.element import Authority as Authority
+from quietbus.model.element import Driven as Driven
+from quietbus.model.element import Energy as Energy
 from quietbus.model.element import Own as Own
 from quietbus.model.element import Rates as Rates
+from quietbus.model.element import RigidParts as RigidParts
 from quietbus.model.report import Output as Output
 from quietbus.model.report import Quantity as Quantity
 from quietbus.model.struts import AbstractStrut as AbstractStrut

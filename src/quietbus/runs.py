@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import xarray as xr
 
-from quietbus.build import build_initial_state, build_satellite
+from quietbus.build import build_initial_state, build_satellite, energy_notes
 from quietbus.methods import Direct, Harmonic, Method
 from quietbus.results import aliasing, delivery_notes, rotor_notes, to_dataset
 from quietbus.results.checkpoint import Checkpoint
@@ -105,7 +105,8 @@ def _(
         keeping.keep,
         keeping.start,
     )
-    return to_dataset(task, solution, keeping.wall_time()), ()
+    run = to_dataset(task, solution, keeping.wall_time())
+    return run, energy_notes(scenario, satellite)
 
 
 @_solve.register
@@ -126,7 +127,8 @@ def _(
         keep=keeping.keep,
         start=keeping.start,
     )
-    return to_dataset(task, solution, keeping.wall_time()), solution.jitter.warnings
+    run = to_dataset(task, solution, keeping.wall_time())
+    return run, (*solution.jitter.warnings, *energy_notes(scenario, satellite))
 
 
 def foreseen(task: Task) -> Notes:

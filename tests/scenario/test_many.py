@@ -332,6 +332,14 @@ def _platforms(value):
     return two() | {"platforms": value}, ("platforms",)
 
 
+def _strut(value):
+    data = two()
+    legs = data["platforms"][0]["isolator"]["legs"]
+    del legs["stiffness"], legs["damping"]
+    legs["strut"] = value
+    return data, ("platforms", 0, "isolator", "legs", "strut")
+
+
 MANY = _without("units", WHEELS) | {"pyramid": {"skew": 1, "radius": 1, "units": 600}}
 REFUSED = {
     "two platforms of one name": (
@@ -403,9 +411,37 @@ REFUSED = {
     ),
     "platforms by name": (
         *_platforms({"north": PLATFORM}),
-        "expected a list of any number of platforms, got a mapping",
+        "expected a list of one or more platforms, or isolator and cluster instead, got a mapping",
     ),
-    "a number of platforms": (*_platforms(2), "expected a list of any number of platforms, got 2"),
+    **{
+        f"platforms: {got}": (
+            *_platforms(value),
+            "expected a list of one or more platforms, or isolator and cluster instead, "
+            f"got {got}",
+        )
+        for value, got in ((2, "2"), (None, "nothing"), ([], "nothing"), ({}, "a mapping"))
+    },
+    "a payload that is forgotten": (
+        ZHANG | {"payload": None},
+        ("payload",),
+        "expected a mapping with keys among name, on, body, isolator, got nothing",
+    ),
+    "wheels without a type": (
+        *_blocks(CMGS, _without("type", WHEELS), at=(1,)),
+        ".type: expected wheel, as a block with housing has it (left out, it is cmg), got nothing",
+    ),
+    "a type that is forgotten": (
+        *_blocks(CMGS | {"type": None}, WHEELS, at=(0, "type")),
+        "expected one of cmg, wheel, got nothing",
+    ),
+    "a strut without type": (
+        *_strut({"stiffness": "20 kN/m"}),
+        ".type: expected spring_damper, or a type that --parts FILE.py registers, got nothing",
+    ),
+    "a strut that is a word": (
+        *_strut("spring_damper"),
+        "expected a mapping with the key type, got 'spring_damper'",
+    ),
     "no block": (
         *_blocks(at=()),
         "expected a list of one or more blocks of CMGs or wheels, got [] (0 of them)",
@@ -504,3 +540,9 @@ def test_unknown_type_of_a_strut_names_those_that_are_known():
         f"s.yaml: isolator.legs.strut.type (line {line}): expected spring_damper, or a type that "
         "--parts FILE.py registers, got 'spring_dampr'"
     ]
+
+
+def test_an_actuator_without_type_is_told():
+    (told,) = refusal(ZHANG | {"actuators": {"rods": {"torque": "1 N*m"}}})
+    said = r"expected a type that --parts FILE\.py registers, got nothing"
+    assert re.fullmatch(rf"s\.yaml: actuators\.rods\.type \(line \d+\): {said}", told)

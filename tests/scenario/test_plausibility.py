@@ -135,6 +135,30 @@ def test_all_numbers_with_a_unit_are_looked_at():
         assert found[path].unit == unit, path
 
 
+def platforms(**isolator):
+    """Two platforms, the second with something else in its isolator."""
+    data = ZHANG.to_dict()
+    first = {"name": "east", "isolator": data.pop("isolator"), "cluster": data.pop("cluster")}
+    second = first | {"name": "west", "isolator": first["isolator"] | isolator}
+    return Scenario.from_dict(data | {"platforms": [first, second]})
+
+
+def test_platforms_at_one_place_are_told():
+    """To a millimetre, whatever their attitudes; the built-in's stands at 0.6 m."""
+    said = "m on the bus, where east stands too"
+    path = "platforms[1].isolator.offset: read as"
+    assert implausible(platforms()) == [f"{path} [0, 0, 0.6] {said}"]
+    near = platforms(offset=[0, 9e-4, 0.6], orientation=[0, 0, 0.3])
+    assert implausible(near) == [f"{path} [0, 0.0009, 0.6] {said}"]
+    assert not implausible(platforms(offset=[0, 2e-3, 0.6]))
+
+
+def test_platforms_that_stand_on_each_other_are_not_at_one_place():
+    data = platforms().to_dict()
+    data["platforms"][1]["on"] = "east"
+    assert not implausible(Scenario.from_dict(data))
+
+
 def test_python_is_warned_too():
     with pytest.warns(qb.ImplausibleValue, match="offset\\[2\\]: read as 600 m"):
         qb.analyze(ZHANG.with_overrides({"isolator.offset": [0, 0, 600]}))

@@ -7,6 +7,8 @@ import jax
 import numpy as np
 
 from quietbus.build.arrays import array, rotation
+from quietbus.build.own import built, is_own
+from quietbus.build.own_struts import check_strut
 from quietbus.model.legs.hexapod import Hexapod
 from quietbus.model.legs.inertia import LegBodies, LegParts
 from quietbus.model.legs.kinematics import Geometry
@@ -36,6 +38,9 @@ def legs_of(isolator: Mounting, name: str, hosts: tuple[str, str], holds: bool) 
     Args:
         hosts: names of the upper body and of the base.
         holds: whether they, and no weld, hold the upper body.
+
+    Raises:
+        LawError: a strut of a user's own kind that is wrong.
     """
     legs, base = isolator.legs, rotation(isolator.orientation)
     lower, upper = isolator.joints()
@@ -50,6 +55,9 @@ def legs_of(isolator: Mounting, name: str, hosts: tuple[str, str], holds: bool) 
         return LegParts(*(array([getattr(part, key) for part in each]) for key in keys))
 
     free = np.broadcast_to(length if legs.free_length is None else legs.free_length, legs.count)
+    strut = built(strut_of, AbstractStrut, legs.law, legs.count, array(free))
+    if is_own(legs.law):
+        check_strut(strut, length)
     return Hexapod(
         name,
         hosts,
@@ -65,6 +73,6 @@ def legs_of(isolator: Mounting, name: str, hosts: tuple[str, str], holds: bool) 
             spherical_friction=per_leg(legs.spherical_friction),
             universal_friction=per_leg(legs.universal_friction),
         ),
-        strut_of(legs.law, legs.count, array(free)),
+        strut,
         holds,
     )

@@ -12,6 +12,8 @@ from quietbus.build.cluster import cluster_of
 from quietbus.build.control import controller_of, guidance_of, steering_of
 from quietbus.build.legs import legs_of
 from quietbus.build.loads import load_of
+from quietbus.build.own import built, told_at
+from quietbus.build.own_actuators import check_actuator, check_at_start
 from quietbus.dynamics.closed_loop import initial_state
 from quietbus.dynamics.invariants import rigid_parts
 from quietbus.dynamics.state import State
@@ -19,6 +21,7 @@ from quietbus.model.body import Body, Mount
 from quietbus.model.cluster import Cluster
 from quietbus.model.control import Control
 from quietbus.model.controller import NoController
+from quietbus.model.element import AbstractActuator
 from quietbus.model.legs.hexapod import Hexapod
 from quietbus.model.satellite import BUS, Satellite
 from quietbus.model.steering import NoSteering
@@ -40,6 +43,9 @@ def build_satellite(
         mount: of all platforms, instead of their own.
         first_unit: number of the first unit where the satellite has others, on other platforms:
             random phases go by it.
+
+    Raises:
+        ScenarioError: a part of a user's own kind that is wrong, by class and method.
     """
     if mount not in (None, "isolated", "rigid"):
         raise ValueError(f"mount must be 'isolated' or 'rigid', got {mount!r}")
@@ -55,13 +61,19 @@ def build_satellite(
         numbers = (plate.mass, plate.center_of_mass, plate.inertia)
         bodies.append(Body(site.name, *map(array, numbers)))
         legs = "legs" if alone else f"{site.name} legs"
-        hexapods.append(legs_of(site.isolator, legs, (site.name, site.on), not welded[site.name]))
+        hosts = (site.name, site.on)
+        with told_at(scenario, site.strut_at):
+            hexapods.append(legs_of(site.isolator, legs, hosts, not welded[site.name]))
         for k, block in enumerate(site.blocks):
             name = "cluster" if alone else f"{site.name} cluster"
             name = name if len(site.blocks) == 1 else f"{name} {k}"
             clusters.append(cluster_of(block, name, site.name, first_unit))
             first_unit += block.count
-    actuators = [actuator_of(each, name) for name, each in scenario.actuators.items()]
+    actuators = []
+    for name, each in scenario.actuators.items():
+        with told_at(scenario, ("actuators", name)):
+            actuators.append(built(actuator_of, AbstractActuator, each, name))
+            check_actuator(actuators[-1], name, scenario.bodies)
     loads = [load_of(load, f"load {k}") for k, load in enumerate(scenario.loads)]
     commanded = [element.name for element in (*clusters, *actuators) if element.commands]
     said = scenario.control
@@ -79,6 +91,7 @@ def build_satellite(
         (*actuators, *loads),
         control,
     )
+    check_at_start(scenario, satellite)
     if not said:
         return satellite
     inertia = _whole_inertia(satellite, array(scenario.units.gimbal_angles))

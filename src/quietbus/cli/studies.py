@@ -94,12 +94,15 @@ def jitter(
         make_folder(output, "jitter.json")
     import_heavy()
     from quietbus import api
+    from quietbus.scenario import ScenarioError
 
     try:
-        with status() as tell:
+        with status() as tell, notes():
             tell("computing (compiles for some seconds the first time)")
             study = api.jitter(checked)
             numbers = study.to_dict(most)
+    except ScenarioError:
+        raise
     except ValueError as error:
         raise BadInput(f"{scenario}: {error}") from None
     if as_json:

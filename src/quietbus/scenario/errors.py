@@ -123,6 +123,10 @@ def _message(details: ErrorDetails) -> str:
             return f"expected {details['ctx']['expected']}, got {shown(value)}"
         case "bool_type":
             return f"expected true or false, got {shown(value)}"
+        case "float_type" | "float_parsing":  # of users' own parts: others' numbers are quantities
+            return (
+                f"expected a number without a unit, as its type has no Measure, got {shown(value)}"
+            )
         case _:
             return f"is not valid, got {shown(value)}"
 

@@ -48,9 +48,9 @@ class Kinds:
     def _read(self, value: Any, info: ValidationInfo) -> Part:
         if isinstance(value, Part):
             return value
-        if not isinstance(value, dict) or "type" not in value:
+        if not isinstance(value, dict):
             raise expected("a mapping with the key type", value)
-        word = value["type"]
+        word: Any = value.get("type")
         if not isinstance(word, str) or word not in self.known:
             findings = Findings()
             own = "a type that --parts FILE.py registers"

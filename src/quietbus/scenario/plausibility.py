@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from quietbus.scenario.base import Part
 from quietbus.scenario.blocks import Block
+from quietbus.scenario.checks import listed
 from quietbus.scenario.errors import Path, dotted
 from quietbus.scenario.hardware import Cluster, Rotor
 from quietbus.scenario.schema import Scenario
@@ -26,6 +27,7 @@ from quietbus.scenario.units import Quantity
 
 DEG, RPM = 180.0 / np.pi, 30.0 / np.pi
 MOST_TURN = 30.0 / DEG  # [rad] of a step of attitude
+SAME_PLACE = 1e-3  # [m] between bases of isolators, of which no two are so close
 RADII = 20.0  # of gyration of the bus, the farthest that anything on it is from anything else
 
 
@@ -186,6 +188,7 @@ def _radius(mass: float, inertia: Any) -> float:
 def _derived(scenario: Scenario) -> Iterator[tuple[str, str]]:
     """Paths and notes on what follows from several numbers."""
     yield from _bodies(scenario)
+    yield from _places(scenario)
     yield from _rotors(scenario)
     yield from _suspension(scenario)
     yield from _attitudes(scenario)
@@ -223,6 +226,19 @@ def _bodies(scenario: Scenario) -> Iterator[tuple[str, str]]:
                 f"{max(body.inertia):.4g} kg m^2 with a mass of {body.mass:.4g} kg: a radius of "
                 f"gyration of {radius:.3g} m, where units have 5 mm to 2 m",
             )
+
+
+def _places(scenario: Scenario) -> Iterator[tuple[str, str]]:
+    """Isolators whose bases are at one and the same place of a body."""
+    sites = scenario.sites
+    for k, site in enumerate(sites):
+        offset = site.isolator.offset
+        for other in sites[:k]:
+            apart = np.linalg.norm(np.subtract(offset, other.isolator.offset))
+            if site.on == other.on and apart < SAME_PLACE:
+                where = dotted((*site.path, "isolator", "offset"))
+                yield where, f"{listed(offset)} m on the {site.on}, where {other.name} stands too"
+                break
 
 
 def _blocks(scenario: Scenario) -> list[tuple[str, Block]]:

@@ -98,6 +98,18 @@ def _none_word(value: Any) -> Any:
     return None if value == "none" else value
 
 
+def _platforms(value: Any) -> Any:
+    if not isinstance(value, list | tuple):
+        raise expected("a list of one or more platforms, or isolator and cluster instead", value)
+    return value
+
+
+def _payload(value: Any) -> Any:
+    if value is None:  # a forgotten value: without a payload there is no such key
+        raise expected(f"a mapping with keys among {', '.join(Payload.model_fields)}", value)
+    return value
+
+
 @functools.lru_cache(maxsize=64)
 def _yaml_text(data: str) -> str:
     """YAML of a scenario's JSON; kept, since writing it takes long beside a harmonic run."""
@@ -131,8 +143,8 @@ class Scenario(Part):
     # these two, or instead of them several platforms
     isolator: Isolator = None  # type: ignore[assignment]
     cluster: AnyBlocks = None  # type: ignore[assignment]
-    platforms: Annotated[tuple[Platform, ...], listing(None, "platforms", least=0)] = ()
-    payload: Payload | None = None
+    platforms: Annotated[tuple[Platform, ...], BeforeValidator(_platforms)] = ()
+    payload: Annotated[Payload | None, BeforeValidator(_payload)] = None
     actuators: Actuators = FrozenDict()  # of users' own kinds
     control: Annotated[Control | None, BeforeValidator(_none_word)] = None
     initial: Initial = Initial()
@@ -194,6 +206,8 @@ class Scenario(Part):
         if not isinstance(data, dict):
             return data
         one = ("isolator", "cluster")
+        if "platforms" in data and not any(key in data for key in one):
+            return data | {"platforms": None} if data["platforms"] in ([], ()) else data
         if not data.get("platforms"):
             return dict.fromkeys(one) | data
         findings = Findings()

@@ -64,6 +64,11 @@ class Site:
         return dotted((*self.path, "isolator", "legs"))
 
     @property
+    def strut_at(self) -> Path:
+        """Path of a law of struts."""
+        return (*self.path, "isolator", "legs", "strut")
+
+    @property
     def plate_at(self) -> str:
         """Path of the body."""
         return dotted((*self.path, *self.plate_key))

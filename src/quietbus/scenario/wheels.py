@@ -127,6 +127,7 @@ class WheelCluster(Placed):
 
 
 TYPES = ("cmg", "wheel")
+CMG_KEYS = Cluster.model_fields.keys()
 
 
 def _known_type(value: Any) -> Any:
@@ -140,9 +141,14 @@ def _known_type(value: Any) -> Any:
         if isinstance(unit, dict) and "type" in unit
     ]
     common = [(("type",), value["type"])] if "type" in value else []
+    if not common and all(kind is None for _, kind in of_units):
+        of_wheels = [key for key in value if key in WheelCluster.model_fields.keys() - CMG_KEYS]
+        if of_wheels:
+            what = f"wheel, as a block with {of_wheels[0]} has it (left out, it is cmg)"
+            findings.add("type", expected(what, None).message())
     known: list[str] = []
     for path, kind in [*common, *of_units]:
-        if kind not in TYPES and kind is not None:
+        if kind not in TYPES and (kind is not None or path == ("type",)):
             findings.add(path, expected(f"one of {', '.join(TYPES)}", kind).message())
         elif known and kind not in (None, known[0]):
             what = f"{known[0]} as before, since one block cannot mix CMGs and reaction wheels (a "

@@ -25,7 +25,7 @@ from quietbus.analysis.control.pid import PID
 from quietbus.analysis.control.stability import nearest_range
 from quietbus.analysis.control.transmissibility import Places, Transmissibility, transmissibility
 from quietbus.arguments import array, choice
-from quietbus.build import build_satellite
+from quietbus.build import build_satellite, energy_notes
 from quietbus.dynamics.linearize import (
     AXES,
     Actuation,
@@ -36,6 +36,7 @@ from quietbus.dynamics.linearize import (
 )
 from quietbus.model.body import Mount
 from quietbus.model.satellite import Satellite
+from quietbus.model.struts import StrutTangent
 from quietbus.model.variants import (
     with_base_fixed,
     with_mount,
@@ -44,7 +45,7 @@ from quietbus.model.variants import (
     without_rotation,
 )
 from quietbus.plain import json_ready
-from quietbus.scenario import Scenario
+from quietbus.scenario import Problem, Scenario, ScenarioError
 from quietbus.spatial.rotation import quaternion_to_matrix
 
 
@@ -95,6 +96,7 @@ class Study:
                 "The scenario lets no unit act (steering: none), so that a run feels no control; "
                 "the loop is analysed as if the plate received the torque that is asked for."
             )
+        notes += [f"{note}." for note in energy_notes(self.scenario, self.satellite)]
         if len(self.scenario.sites) > 1:
             others = ", ".join(site.name for site in self.scenario.sites[1:])
             notes.append(
@@ -111,13 +113,29 @@ class Study:
         choice("actuator", actuator, ("servo", "ideal"))
         return linearize(self.satellite, self.point, actuator)
 
+    @property
+    def _tangent(self) -> StrutTangent:
+        """The platform's struts for small motion, in NumPy's arrays.
+
+        Raises:
+            ScenarioError: one is negative, as a law of a user's own may have it.
+        """
+        site, legs = self.scenario.sites[0], self.satellite.hexapods[0]
+        tangent = StrutTangent(*map(np.asarray, legs.tangent))
+        for value, what in ((tangent.stiffness, "stiffness"), (tangent.damping, "damping")):
+            if np.any(value < 0.0):
+                said = f"expected a {what} of 0 or more at rest, as an analysis needs it, got "
+                said = f"{type(legs.strut).__name__}.tension: {said}{value.min():.4g}"
+                raise ScenarioError(self.scenario.name, [Problem(said, site.strut_at)])
+        return tangent
+
     @cached_property
     def isolator(self) -> HexapodIsolator:
         """The platform on massless legs over a fixed base, about the base plate's centre."""
         isolator, (legs, *_) = self.scenario.sites[0].isolator, self.satellite.hexapods
         name = self._platform.body
         mass, center, inertia = platform_inertia(self.satellite, self.gimbal_angle, name)
-        stiffness, damping, *memory = map(np.asarray, legs.tangent)
+        stiffness, damping, *memory = self._tangent
         base = np.asarray(isolator.offset)
         R_BP = np.asarray(quaternion_to_matrix(self._platform.q_BX))
         plate = np.asarray(self._platform.p_BX_B) - base
