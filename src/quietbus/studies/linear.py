@@ -36,7 +36,6 @@ from quietbus.dynamics.linearize import (
 )
 from quietbus.model.body import Mount
 from quietbus.model.satellite import Satellite
-from quietbus.model.struts import StrutTangent
 from quietbus.model.variants import (
     with_base_fixed,
     with_mount,
@@ -114,15 +113,15 @@ class Study:
         return linearize(self.satellite, self.point, actuator)
 
     @property
-    def _tangent(self) -> StrutTangent:
-        """The platform's struts for small motion, in NumPy's arrays.
+    def _tangent(self) -> list[np.ndarray]:
+        """The platform's struts for small motion (a ``StrutTangent``).
 
         Raises:
             ScenarioError: one is negative, as a law of a user's own may have it.
         """
         site, legs = self.scenario.sites[0], self.satellite.hexapods[0]
-        tangent = StrutTangent(*map(np.asarray, legs.tangent))
-        for value, what in ((tangent.stiffness, "stiffness"), (tangent.damping, "damping")):
+        tangent = [np.asarray(each) for each in legs.tangent]
+        for value, what in zip(tangent, ("stiffness", "damping"), strict=False):
             if np.any(value < 0.0):
                 said = f"expected a {what} of 0 or more at rest, as an analysis needs it, got "
                 said = f"{type(legs.strut).__name__}.tension: {said}{value.min():.4g}"
