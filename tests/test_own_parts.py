@@ -11,6 +11,7 @@ import pytest
 
 import quietbus as qb
 from quietbus.build import build_satellite, energy_notes
+from quietbus.cli.guard import BadInput
 from quietbus.cli.own_parts import load_parts
 from quietbus.scenario import ScenarioError
 from quietbus.scenario.actuators import ACTUATORS
@@ -209,6 +210,49 @@ def test_a_quantity_where_a_part_has_a_plain_number_is_told(load):
     assert build_satellite(scenario()).actuators[1].full == 0.5
 
 
+IMPORTS = "import equinox as eqx\n"
+PART = f"{IMPORTS}from quietbus.extend import Part\n"
+
+
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [
+        ("def per_leg(self):\n        return ('rate',)", "per_leg or spring_and_damper raised "
+         "AttributeError: 'DStrut' object has no attribute 'rate'"),
+        ("def spring_and_damper(self):\n        return self.k", "per_leg or spring_and_damper "
+         "raised AttributeError: 'DStrut' object has no attribute 'k'"),
+    ],
+)  # fmt: skip
+def test_what_a_kind_of_struts_says_of_itself_is_told_where_it_is_wrong(load, code, said):
+    load(
+        ("    series_stiffness: Stiffness\n", f"    series_stiffness: Stiffness\n\n    {code}\n\n")
+    )
+    with pytest.raises(ScenarioError) as caught:
+        scenario()
+    assert str(caught.value) == f"<data>: isolator.legs.strut: DStrut: {said}"
+
+
+def test_what_a_users_own_check_says_is_told(load):
+    check = """
+    @pydantic.model_validator(mode="after")
+    def _check(self):
+        if self.series_stiffness > 4.0 * self.stiffness:
+            raise ValueError("expected a series spring of at most four times the other")
+        return self
+"""
+    line = "    damping: Damping\n"
+    load((IMPORTS, f"{IMPORTS}import pydantic\n"), (line, line + check))
+    with pytest.raises(ScenarioError) as caught:
+        scenario()
+    said = "expected a series spring of at most four times the other"
+    assert str(caught.value) == f"<data>: isolator.legs.strut: {said}"
+
+
+def test_a_kind_of_struts_is_made_of_their_base(load):
+    with pytest.raises(BadInput, match=r"line \d+: TypeError: DStrut: expected a StrutKind with"):
+        load(("class DStrut(StrutKind)", "class DStrut(Part)"), (IMPORTS, PART))
+
+
 # --- energy ------------------------------------------------------------------------------------
 
 
@@ -234,8 +278,8 @@ def test_struts_that_bring_energy_are_told(load, power):
     load(("numbers = (said.stiffness, said.series_stiffness, said.damping)",
           "numbers = (said.stiffness, said.series_stiffness, -said.damping)"))  # fmt: skip
     assert energy_told(scenario()) == (
-        f"{AT_STRUT}DStrutLaw brings energy in, which can make motions grow: with all legs off by "
-        f"0.1 % and growing by 10 mm/s tension takes {-power:.3g} W beyond what stored gains, "
+        f"{AT_STRUT}DStrutLaw brings energy in, which can make motions grow: with all legs 0.1 % "
+        f"longer and growing by 10 mm/s tension takes {-power:.3g} W beyond what stored gains, "
         f"dissipated says {-power:.3g} W",
     )
 
@@ -249,12 +293,34 @@ def test_struts_that_say_they_take_what_they_bring_are_told(load, power):
     assert note.endswith(f"dissipated says {power:.3g} W")
 
 
+def test_struts_without_derivatives_are_not_looked_at(load):
+    """A run goes on, since one by the direct solver needs none."""
+    callback = "return jax.pure_callback(lambda e: np.sum(e**2), rate[0], e)"
+    load((STORED, callback),
+         (IMPORTS, f"{IMPORTS}import jax\nimport numpy as np\n"))  # fmt: skip
+    (note,) = energy_told(scenario())
+    assert note.startswith(f"{AT_STRUT}the energy of DStrutLaw is not looked at: ")
+
+
 def test_struts_that_take_more_than_they_say_are_told(load, power):
     load((DISSIPATED, f"return 0.5 * {DISSIPATED[7:]}"))
     (note,) = energy_told(scenario())
     assert note.startswith(f"{AT_STRUT}the energy of DStrutLaw does not add up")
     assert f"takes {power:.3g} W beyond" in note
     assert note.endswith(f"dissipated says {0.5 * power:.3g} W")
+
+
+def test_actuators_that_say_they_bring_energy_are_told(load):
+    """Here 2 W for each unit of the sum of the torques: down with all three by 0.001, -6 mW."""
+    energy = "    def energy(self, around):\n        from quietbus.extend import Energy\n"
+    energy += "        return Energy(0.0, 2.0 * jnp.sum(around.own.z))\n\n"
+    load(
+        ("    def rates(self, around, command):", f"{energy}    def rates(self, around, command):")
+    )
+    assert energy_told(scenario()) == (
+        f"{AT_RODS}TorqueRodsLaw brings energy in, which can make motions grow: with all of its "
+        "own off by 0.001, up or down, dissipated says -0.006 W",
+    )
 
 
 @pytest.mark.slow

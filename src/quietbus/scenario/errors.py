@@ -127,6 +127,8 @@ def _message(details: ErrorDetails) -> str:
             return (
                 f"expected a number without a unit, as its type has no Measure, got {shown(value)}"
             )
+        case "value_error" | "assertion_error":  # of users' own checks
+            return str(details["ctx"]["error"])
         case _:
             return f"is not valid, got {shown(value)}"
 

@@ -146,7 +146,12 @@ class Legs(Part):
             findings.add("upper_joints", f"expected at most {MOST_LEGS} legs, got {self.count}")
         lists: dict[Path, Any] = {(key,): getattr(self, key) for key in type(self).model_fields}
         if self.strut is not None:
-            lists |= {("strut", key): getattr(self.strut, key) for key in self.strut.per_leg()}
+            try:
+                lists |= {("strut", key): getattr(self.strut, key) for key in self.strut.per_leg()}
+                self.strut.spring_and_damper()
+            except Exception as error:  # of a user's own kind
+                name, words = type(self.strut).__name__, f"{type(error).__name__}: {error}"
+                findings.add("strut", f"{name}: per_leg or spring_and_damper raised {words}")
         for path, value in lists.items():
             if isinstance(value, tuple) and len(value) != self.count:
                 findings.add(

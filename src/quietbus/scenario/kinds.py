@@ -17,24 +17,25 @@ Kind = TypeVar("Kind", bound=type)
 class Kinds:
     """A type annotation: any of the kinds registered when a scenario is read."""
 
-    def __init__(self, noun: str) -> None:
-        """Of a noun for messages."""
-        self.noun = noun
+    def __init__(self, noun: str, base: type[Part] = Part) -> None:
+        """Of a noun for messages, and of what all of them have to be."""
+        self.noun, self.base = noun, base
         self.known: dict[str, type[Part]] = {}
 
     def register(self, kind: Kind) -> Kind:
         """Make a kind known, by its field ``type: Literal["word"]``; for use as a decorator.
 
         Raises:
-            TypeError: not a Part with such a field.
+            TypeError: not of the base, or without such a field.
             ValueError: another kind has the word.
         """
         fields: dict[str, Any] = getattr(kind, "model_fields", {})
         words: tuple[Any, ...] = ()
         if "type" in fields:
             words = getattr(fields["type"].annotation, "__args__", ())
-        if len(words) != 1:
-            raise TypeError(f'{kind}: expected a Part with a field type: Literal["word"]')
+        if len(words) != 1 or not issubclass(kind, self.base):
+            what = f'a {self.base.__name__} with a field type: Literal["word"]'
+            raise TypeError(f"{kind.__name__}: expected {what}")
         word = str(words[0])
         other = self.known.get(word)
         if other is not None and (other.__module__, other.__qualname__) != (

@@ -7,9 +7,6 @@ from typing import Annotated, Any, Literal
 from quietbus.scenario.base import Damping, Part, PerLeg, Stiffness
 from quietbus.scenario.kinds import Kinds
 
-STRUTS = Kinds("strut")
-AnyStrut = Annotated[Any, STRUTS]
-
 
 class StrutKind(Part):
     """What a scenario says of a law of struts: the base of kinds, users' own too."""
@@ -24,6 +21,10 @@ class StrutKind(Part):
     def per_leg(self) -> tuple[str, ...]:
         """Keys whose lists have one value for each leg."""
         return ()
+
+
+STRUTS = Kinds("strut", StrutKind)
+AnyStrut = Annotated[Any, STRUTS]
 
 
 @STRUTS.register
