@@ -17,6 +17,7 @@ from quietbus import programs
 from quietbus.dynamics import linearize
 from quietbus.programs import KeptProgramWarning, Program
 
+TESTS = Path(__file__).parent
 ANGLES = jnp.array([0.1, -0.2, 0.3, 0.4])
 
 
@@ -188,13 +189,19 @@ for actuator in ("servo", "ideal"):
 """
 
 
-def test_fresh_processes_share_programs_even_at_once(tmp_path):
+@pytest.mark.parametrize("flags", ["", "--xla_force_host_platform_device_count=3"])
+def test_fresh_processes_share_programs_even_at_once(tmp_path, flags):
     """The second traces nothing; without LAPACK made ready, machine code read ends the process."""
 
     def start(how):
         return subprocess.Popen(
             [sys.executable, "-c", RUN, how],
-            env={**_environment(), "JAX_COMPILATION_CACHE_DIR": str(tmp_path)},
+            env={
+                **os.environ,
+                "PYTHONPATH": os.pathsep.join([str(TESTS), os.environ.get("PYTHONPATH", "")]),
+                "XLA_FLAGS": f"{os.environ.get('XLA_FLAGS', '')} {flags}",
+                "JAX_COMPILATION_CACHE_DIR": str(tmp_path),
+            },
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -210,7 +217,3 @@ def test_fresh_processes_share_programs_even_at_once(tmp_path):
     first = finish(one)
     assert finish(other) == first
     assert finish(start("kept")) == first
-
-
-def _environment():
-    return {**os.environ, "PYTHONPATH": str(Path(__file__).parent)}

@@ -274,7 +274,10 @@ def _read_program(file: Path) -> Callable | None:
         file.touch()  # used lately
     try:
         return serialize_executable.deserialize_and_load(
-            payload, jax.tree.structure(((0,) * inputs, {})), jax.tree.structure([0] * outputs)
+            payload,
+            jax.tree.structure(((0,) * inputs, {})),
+            jax.tree.structure([0] * outputs),
+            execution_devices=jax.devices()[:1],
         )
     except Exception as error:  # whatever it is: the program is made anew
         _warn(f"{file}: a kept program cannot be loaded ({error}); it is made anew")
