@@ -147,12 +147,22 @@ class Asked:
             self.fits(f"{method}().{key}", getattr(given, key), shape, why)
         return given
 
-    def finite(self, method: str, value: Any) -> None:
-        """Refuse what has numbers that are not finite, at rest at the start of a run."""
-        for leaf in jax.tree.leaves(value):
-            if not np.all(np.isfinite(leaf)):
-                wanted = "finite numbers at rest at the start of a run"
-                raise self.wrong(method, wanted, shown(np.asarray(leaf)))
+    def slopes(self, method: str, *at: Any) -> None:
+        """Refuse a method that has no derivatives, by which linear models and vibration follow."""
+
+        def slopes(law: Any, *at: Any) -> Any:
+            return jax.jacfwd(getattr(law, method), argnums=tuple(range(len(at))))(*at)
+
+        with self._asking(f"{method}, its derivatives"):
+            jax.eval_shape(slopes, self.law, *at)
+
+    def finite(self, method: str, value: Any, what: str = "numbers") -> None:
+        """Refuse what is not finite, at rest at the start of a run."""
+        for leaf in map(np.asarray, jax.tree.leaves(value)):
+            bad = leaf[~np.isfinite(leaf)]
+            if bad.size:
+                wanted = f"finite {what} at rest at the start of a run"
+                raise self.wrong(method, wanted, shown(bad[0]))
 
 
 def _kind(value: Any) -> str:

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -70,6 +71,8 @@ def _check_motion(asked: Asked, around: Around, commands: int) -> None:
         "rates", (around, command), Rates, "as start has it", y=own.y.shape, z=own.z.shape
     )
     asked.gives("balance", moving, (n,), speeds)
+    asked.slopes("rates", around, command)
+    asked.slopes("balance", *moving)
     asked.gives("answer", moving, (3, n, len(own.y)), "derivatives of balance")
     asked.gives("configuration", (around,), (None,), "in a row")
     asked.gives("margin", (around,), ())
@@ -118,6 +121,7 @@ def check_at_start(scenario: Scenario, satellite: Satellite) -> None:
 def _check_numbers(asked: Asked, numbers: dict[str, Any]) -> None:
     for name in ("rates", "mass", "balance", "energy", "authority"):
         asked.finite(name, numbers.get(name))
+        asked.finite(name, numbers.get(f"{name} slopes"), "derivatives")
     if "authority" not in numbers:
         return
     for key in ("torque", "full"):
@@ -133,12 +137,15 @@ def _check_numbers(asked: Asked, numbers: dict[str, Any]) -> None:
 def _numbers(actuator, nominal):
     hosts, own = tuple(nominal[host] for host in actuator.hosts), actuator.start()
     around, n = Around(jnp.zeros(()), jnp.eye(3), hosts, own), actuator.commands
-    rates = actuator.rates(around, jnp.zeros(n or len(own.y)))
-    u_rate = jnp.zeros(6 * len(hosts) + len(own.u))
+    asked = (around, jnp.zeros(n or len(own.y)))
+    rates = actuator.rates(*asked)
+    moving = (around, rates, jnp.zeros(6 * len(hosts) + len(own.u)))
     numbers = {
         "mass": actuator.mass(around),
         "rates": rates,
-        "balance": actuator.balance(around, rates, u_rate),
+        "balance": actuator.balance(*moving),
+        "rates slopes": jax.jacfwd(actuator.rates, argnums=(0, 1))(*asked),
+        "balance slopes": jax.jacfwd(actuator.balance, argnums=(0, 1, 2))(*moving),
         "energy": actuator.energy(around),
     }
     if not n:
