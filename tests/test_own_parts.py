@@ -107,6 +107,7 @@ SMOOTH = "finite derivatives at rest at the start of a run"
         (TENSION, "return jnp.sum(e)", "tension", LEGS, "float64 of shape ()"),
         (TENSION, "return e.astype('float32')", "tension", LEGS, "float32 of shape (6,)"),
         (TENSION, "return None", "tension", LEGS, "nothing"),
+        (TENSION, "return [e]", "tension", LEGS, "an object of type list"),
         (TENSION, "return e, z", "tension", LEGS, "an object of type tuple"),
         (
             MEMORY,
@@ -121,6 +122,13 @@ SMOOTH = "finite derivatives at rest at the start of a run"
             "start",
             "float64 of shape (n,), all states in a row",
             "float64 of shape (6, 2)",
+        ),
+        (
+            "return jnp.zeros_like(self.free_length)",
+            "return [0.0]",
+            "start",
+            "float64 of shape (n,), all states in a row",
+            "an object of type list",
         ),
         (
             STORED,
@@ -566,6 +574,22 @@ def test_actuators_that_raise_or_are_not_made_are_told(load):
     line = in_line(text, "return self.torque")
     said = f"TorqueRodsLaw.balance: raised AttributeError in own_parts.py, line {line}: "
     assert told().startswith(AT_RODS + said)
+
+
+@pytest.mark.parametrize(
+    ("told_of", "said"),
+    [
+        ("{'x': 1}", "expected a tuple of Output, got a mapping"),
+        ("(Output(TORQUES, self.full),)", "rods: expected numbers over axis, got shape ()"),
+    ],
+)
+def test_actuators_with_a_report_that_is_none_are_told(load, told_of, said):
+    report = "    def report(self, around, rates, u_rate, detailed=False):\n        from quietbus "
+    report += "import extend\n        from quietbus.extend import Output\n"
+    report += '        TORQUES = extend.Quantity("rods", ("axis",), "N m", "of the rods")\n'
+    rates = "    def rates(self, around, command):"
+    load((rates, f"{report}        return {told_of}\n\n{rates}"))
+    assert told() == f"{AT_RODS}TorqueRodsLaw.report: raised TypeError: {said}"
 
 
 def test_two_actuators_with_the_same_names_of_commands_are_told(load):

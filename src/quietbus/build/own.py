@@ -122,8 +122,8 @@ class Asked:
 
     def fits(self, what: str, value: Any, shape: Shape, why: str = "") -> None:
         """Refuse what is no numbers of a shape."""
-        found = getattr(value, "shape", ("none",))
-        right = len(found) == len(shape)
+        found: Any = getattr(value, "shape", None)  # Python's lists have none
+        right = isinstance(found, tuple) and len(found) == len(shape)
         right = right and all(want in (n, None) for n, want in zip(found, shape, strict=True))
         of_python = getattr(value, "weak_type", False) and found == ()
         if not right or not (of_python or value.dtype == jnp.float64):
@@ -181,4 +181,5 @@ def _words(error: Exception, kind: type) -> str:
     frames = traceback.walk_tb(error.__traceback__)
     lines = [line for frame, line in frames if frame.f_code.co_filename == file]
     at = f" in {pathlib.Path(file).name}, line {lines[-1]}" if lines else ""
-    return f"raised {type(error).__name__}{at}: {str(error).strip().partition(chr(10))[0]}"
+    said = str(error).strip().partition("\n")[0]
+    return f"raised {type(error).__name__}{at}" + (f": {said}" if said else "")

@@ -20,6 +20,7 @@ from quietbus.model.element import (
     RigidParts,
 )
 from quietbus.model.motion import Motion
+from quietbus.model.report import Output
 from quietbus.model.satellite import Satellite
 from quietbus.scenario import Scenario
 from quietbus.words import shown
@@ -84,7 +85,19 @@ def _check_motion(asked: Asked, around: Around, commands: int) -> None:
     asked.gives_fields(
         "rigid_parts", (around,), RigidParts, "one for each mass", I=inertia, **vectors
     )
-    asked.shapes("report", *moving, of=lambda told: [output.value for output in told])
+    asked.shapes("report", *moving, of=_values)
+
+
+def _values(told: Any) -> list[Any]:
+    """Values of a report, which has to be one."""
+    if not isinstance(told, tuple) or not all(isinstance(each, Output) for each in told):
+        raise TypeError(f"expected a tuple of Output, got {shown(told)}")
+    for quantity, value in told:
+        if jnp.ndim(value) != len(quantity.dimensions):
+            over = ", ".join(quantity.dimensions) or "nothing"
+            got = jnp.shape(value)
+            raise TypeError(f"{quantity.name}: expected numbers over {over}, got shape {got}")
+    return [output.value for output in told]
 
 
 def _check_authority(asked: Asked, around: Around, n: int) -> None:
