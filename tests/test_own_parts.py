@@ -71,6 +71,26 @@ def test_parts_of_the_page_pass(load):
     assert [each.name for each in satellite.actuators] == ["cluster", "rods"]
 
 
+def test_parts_without_memory_or_commands_pass(load):
+    """What a law does not have it need not say."""
+    memory = f"    def memory_rate(self, length, rate, z):\n        {MEMORY}\n\n"
+    load(
+        ("return jnp.zeros_like(self.free_length)", "return jnp.zeros(0)"),
+        (memory, ""),
+        (TENSION, "return self.k_A * e"),
+        (STORED, "return 0.5 * self.k_A * jnp.sum(e**2)"),
+        (DISSIPATED, "return 0.0"),
+        (START, "return Own.of()"),
+        (NAMES, "return []"),
+        (RATES, "return Rates(around.own.y, around.own.z)"),
+        (BALANCE, "return jnp.zeros(6)"),
+    )
+    checked = scenario()
+    satellite = build_satellite(checked)
+    assert [each.name for each in satellite.actuators] == ["cluster"]
+    assert energy_notes(checked, satellite) == ()
+
+
 TENSION = "return self.k_A * e + self.k_B * (e - z)"
 MEMORY = "return self.k_B * (length - self.free_length - z) / self.c"
 STORED = "return 0.5 * jnp.sum(self.k_A * e**2 + self.k_B * (e - z) ** 2)"
@@ -78,6 +98,7 @@ DISSIPATED = "return self.c * jnp.sum(self.memory_rate(length, rate, z) ** 2)"
 MADE = "return DStrutLaw(free_length, *map(jnp.asarray, numbers))"
 LEGS = "float64 of shape (6,), one for each leg"
 FINITE = "finite numbers at rest at the start of a run"
+SMOOTH = "finite derivatives at rest at the start of a run"
 
 
 @pytest.mark.parametrize(
@@ -86,6 +107,7 @@ FINITE = "finite numbers at rest at the start of a run"
         (TENSION, "return jnp.sum(e)", "tension", LEGS, "float64 of shape ()"),
         (TENSION, "return e.astype('float32')", "tension", LEGS, "float32 of shape (6,)"),
         (TENSION, "return None", "tension", LEGS, "nothing"),
+        (TENSION, "return [e]", "tension", LEGS, "an object of type list"),
         (TENSION, "return e, z", "tension", LEGS, "an object of type tuple"),
         (
             MEMORY,
@@ -100,6 +122,13 @@ FINITE = "finite numbers at rest at the start of a run"
             "start",
             "float64 of shape (n,), all states in a row",
             "float64 of shape (6, 2)",
+        ),
+        (
+            "return jnp.zeros_like(self.free_length)",
+            "return [0.0]",
+            "start",
+            "float64 of shape (n,), all states in a row",
+            "an object of type list",
         ),
         (
             STORED,
@@ -130,9 +159,23 @@ FINITE = "finite numbers at rest at the start of a run"
             LEGS,
             "float64 of shape (4,)",
         ),
-        (TENSION, "return jnp.log(0.0 * e)", "tension", FINITE, str([-float("inf")] * 6)),
-        (MEMORY, "return 0.0 / (0.0 * z)", "memory_rate", FINITE, str([float("nan")] * 6)),
+        (TENSION, "return jnp.log(0.0 * e)", "tension", FINITE, "-inf"),
+        (MEMORY, "return 0.0 / (0.0 * z)", "memory_rate", FINITE, "nan"),
         (STORED, "return jnp.sqrt(-1.0)", "stored", FINITE, "nan"),
+        (
+            TENSION,
+            "return self.k_A * e + jnp.sqrt(rate)",
+            "tension",
+            SMOOTH,
+            "nan",
+        ),
+        (
+            MEMORY,
+            "return jnp.sqrt(z)",
+            "memory_rate",
+            SMOOTH,
+            "nan",
+        ),
     ],
 )
 def test_struts_that_give_what_they_should_not_are_told(load, old, new, what, expected, got):
@@ -153,6 +196,12 @@ def test_struts_that_give_what_they_should_not_are_told(load, old, new, what, ex
             "return e if float(e[0]) else z",
             "DStrutLaw.tension: raised ConcretizationTypeError in own_parts.py, line N: Abstract "
             "tracer value encountered where concrete value is expected",
+        ),
+        (
+            TENSION,
+            "return jnp.zeros(6) + __import__('jax').pure_callback(lambda e: e, e, e)",
+            "DStrutLaw.tension, its derivatives: raised ValueError in own_parts.py, line N: Pure "
+            "callbacks do not support JVP",
         ),
         (
             "def tension(self, length, rate, z):",
@@ -485,13 +534,27 @@ SPEEDS = "6 speeds of each of 1 hosts and 0 of its own"
             "a number above 0, up to 1, for commands of 0",
             "inf",
         ),
-        (BALANCE, "return jnp.full(6, jnp.nan)", "balance", FINITE, str([float("nan")] * 6)),
+        (BALANCE, "return jnp.full(6, jnp.nan)", "balance", FINITE, "nan"),
+        (
+            RATES,
+            "return Rates(around.own.y, jnp.sqrt(command))",
+            "rates",
+            SMOOTH,
+            "nan",
+        ),
+        (
+            BALANCE,
+            "return jnp.sqrt(jnp.concatenate([around.own.z, around.own.z]))",
+            "balance",
+            SMOOTH,
+            "nan",
+        ),
         (
             RATES,
             "return Rates(around.own.y, command / 0.0)",
             "rates",
             FINITE,
-            str([float("nan")] * 3),
+            "nan",
         ),
     ],
 )
@@ -511,6 +574,22 @@ def test_actuators_that_raise_or_are_not_made_are_told(load):
     line = in_line(text, "return self.torque")
     said = f"TorqueRodsLaw.balance: raised AttributeError in own_parts.py, line {line}: "
     assert told().startswith(AT_RODS + said)
+
+
+@pytest.mark.parametrize(
+    ("told_of", "said"),
+    [
+        ("{'x': 1}", "expected a tuple of Output, got a mapping"),
+        ("(Output(TORQUES, self.full),)", "rods: expected numbers over axis, got shape ()"),
+    ],
+)
+def test_actuators_with_a_report_that_is_none_are_told(load, told_of, said):
+    report = "    def report(self, around, rates, u_rate, detailed=False):\n        from quietbus "
+    report += "import extend\n        from quietbus.extend import Output\n"
+    report += '        TORQUES = extend.Quantity("rods", ("axis",), "N m", "of the rods")\n'
+    rates = "    def rates(self, around, command):"
+    load((rates, f"{report}        return {told_of}\n\n{rates}"))
+    assert told() == f"{AT_RODS}TorqueRodsLaw.report: raised TypeError: {said}"
 
 
 def test_two_actuators_with_the_same_names_of_commands_are_told(load):

@@ -122,8 +122,8 @@ class Asked:
 
     def fits(self, what: str, value: Any, shape: Shape, why: str = "") -> None:
         """Refuse what is no numbers of a shape."""
-        found = getattr(value, "shape", ("none",))
-        right = len(found) == len(shape)
+        found: Any = getattr(value, "shape", None)  # Python's lists have none
+        right = isinstance(found, tuple) and len(found) == len(shape)
         right = right and all(want in (n, None) for n, want in zip(found, shape, strict=True))
         of_python = getattr(value, "weak_type", False) and found == ()
         if not right or not (of_python or value.dtype == jnp.float64):
@@ -147,12 +147,22 @@ class Asked:
             self.fits(f"{method}().{key}", getattr(given, key), shape, why)
         return given
 
-    def finite(self, method: str, value: Any) -> None:
-        """Refuse what has numbers that are not finite, at rest at the start of a run."""
-        for leaf in jax.tree.leaves(value):
-            if not np.all(np.isfinite(leaf)):
-                wanted = "finite numbers at rest at the start of a run"
-                raise self.wrong(method, wanted, shown(np.asarray(leaf)))
+    def slopes(self, method: str, *at: Any) -> None:
+        """Refuse a method that has no derivatives, by which linear models and vibration follow."""
+
+        def slopes(law: Any, *at: Any) -> Any:
+            return jax.jacfwd(getattr(law, method), argnums=tuple(range(len(at))))(*at)
+
+        with self._asking(f"{method}, its derivatives"):
+            jax.eval_shape(slopes, self.law, *at)
+
+    def finite(self, method: str, value: Any, what: str = "numbers") -> None:
+        """Refuse what is not finite, at rest at the start of a run."""
+        for leaf in map(np.asarray, jax.tree.leaves(value)):
+            bad = leaf[~np.isfinite(leaf)]
+            if bad.size:
+                wanted = f"finite {what} at rest at the start of a run"
+                raise self.wrong(method, wanted, shown(bad[0]))
 
 
 def _kind(value: Any) -> str:
@@ -171,4 +181,5 @@ def _words(error: Exception, kind: type) -> str:
     frames = traceback.walk_tb(error.__traceback__)
     lines = [line for frame, line in frames if frame.f_code.co_filename == file]
     at = f" in {pathlib.Path(file).name}, line {lines[-1]}" if lines else ""
-    return f"raised {type(error).__name__}{at}: {str(error).strip().partition(chr(10))[0]}"
+    said = str(error).strip().partition("\n")[0]
+    return f"raised {type(error).__name__}{at}" + (f": {said}" if said else "")

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -18,6 +19,7 @@ from quietbus.model.element import (
     RigidParts,
 )
 from quietbus.model.motion import Motion
+from quietbus.model.report import Output
 from quietbus.model.satellite import Satellite
 from quietbus.programs import compiled_for_few_runs
 from quietbus.scenario import Scenario
@@ -70,6 +72,8 @@ def _check_motion(asked: Asked, around: Around, commands: int) -> None:
         "rates", (around, command), Rates, "as start has it", y=own.y.shape, z=own.z.shape
     )
     asked.gives("balance", moving, (n,), speeds)
+    asked.slopes("rates", around, command)
+    asked.slopes("balance", *moving)
     asked.gives("answer", moving, (3, n, len(own.y)), "derivatives of balance")
     asked.gives("configuration", (around,), (None,), "in a row")
     asked.gives("margin", (around,), ())
@@ -81,7 +85,19 @@ def _check_motion(asked: Asked, around: Around, commands: int) -> None:
     asked.gives_fields(
         "rigid_parts", (around,), RigidParts, "one for each mass", I=inertia, **vectors
     )
-    asked.shapes("report", *moving, of=lambda told: [output.value for output in told])
+    asked.shapes("report", *moving, of=_values)
+
+
+def _values(told: Any) -> list[Any]:
+    """Values of a report, which has to be one."""
+    if not isinstance(told, tuple) or not all(isinstance(each, Output) for each in told):
+        raise TypeError(f"expected a tuple of Output, got {shown(told)}")
+    for quantity, value in told:
+        if jnp.ndim(value) != len(quantity.dimensions):
+            over = ", ".join(quantity.dimensions) or "nothing"
+            got = jnp.shape(value)
+            raise TypeError(f"{quantity.name}: expected numbers over {over}, got shape {got}")
+    return [output.value for output in told]
 
 
 def _check_authority(asked: Asked, around: Around, n: int) -> None:
@@ -118,6 +134,7 @@ def check_at_start(scenario: Scenario, satellite: Satellite) -> None:
 def _check_numbers(asked: Asked, numbers: dict[str, Any]) -> None:
     for name in ("rates", "mass", "balance", "energy", "authority"):
         asked.finite(name, numbers.get(name))
+        asked.finite(name, numbers.get(f"{name} slopes"), "derivatives")
     if "authority" not in numbers:
         return
     for key in ("torque", "full"):
@@ -133,12 +150,15 @@ def _check_numbers(asked: Asked, numbers: dict[str, Any]) -> None:
 def _numbers(actuator, nominal):
     hosts, own = tuple(nominal[host] for host in actuator.hosts), actuator.start()
     around, n = Around(jnp.zeros(()), jnp.eye(3), hosts, own), actuator.commands
-    rates = actuator.rates(around, jnp.zeros(n or len(own.y)))
-    u_rate = jnp.zeros(6 * len(hosts) + len(own.u))
+    asked = (around, jnp.zeros(n or len(own.y)))
+    rates = actuator.rates(*asked)
+    moving = (around, rates, jnp.zeros(6 * len(hosts) + len(own.u)))
     numbers = {
         "mass": actuator.mass(around),
         "rates": rates,
-        "balance": actuator.balance(around, rates, u_rate),
+        "balance": actuator.balance(*moving),
+        "rates slopes": jax.jacfwd(actuator.rates, argnums=(0, 1))(*asked),
+        "balance slopes": jax.jacfwd(actuator.balance, argnums=(0, 1, 2))(*moving),
         "energy": actuator.energy(around),
     }
     if not n:

@@ -1,5 +1,6 @@
 """Checks of struts of users' own kinds."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -7,7 +8,7 @@ from quietbus.build.own import Asked, number
 from quietbus.model.struts import AbstractStrut
 from quietbus.programs import compiled_for_few_runs
 
-LAWS = ("tension", "memory_rate", "stored", "dissipated")
+LAWS = ("tension", "memory_rate", "stored", "dissipated")  # the first two have derivatives
 
 
 def check_strut(strut: AbstractStrut, length: np.ndarray) -> None:
@@ -25,11 +26,18 @@ def check_strut(strut: AbstractStrut, length: np.ndarray) -> None:
     asked.gives("memory_rate", at, z.shape, "as start has it")
     for name in ("stored", "dissipated"):
         asked.gives(name, at, (), "of all legs together")
-    for name, value in zip(LAWS, _numbers(strut, jnp.asarray(length)), strict=True):
+    for name in LAWS[:2]:
+        asked.slopes(name, *at)
+    numbers, slopes = _at_rest(strut, jnp.asarray(length))
+    for name, value in zip(LAWS, numbers, strict=True):
         asked.finite(name, value)
+    for name, value in zip(LAWS[:2], slopes, strict=True):
+        asked.finite(name, value, "derivatives")
 
 
 @compiled_for_few_runs
-def _numbers(strut, length):
+def _at_rest(strut, length):
     at = (length, jnp.zeros_like(length), strut.start())
-    return [getattr(strut, law)(*at) for law in LAWS]
+    numbers = [getattr(strut, law)(*at) for law in LAWS]
+    slopes = [jax.jacfwd(getattr(strut, law), argnums=(0, 1, 2))(*at) for law in LAWS[:2]]
+    return numbers, slopes
