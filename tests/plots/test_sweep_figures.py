@@ -19,7 +19,12 @@ def plant(natural):
     gyro = np.kron(np.diag([80.0, 2.0]), [[0.0, 1.0], [-1.0, 0.0]])
     held = np.diag([1.0, 1.0, 0.0, 0.0])
     return SpinningModes(
-        np.eye(4), 4.0 * held, gyro, natural**2 * held, np.zeros((4, 4)), np.eye(12, 4)
+        np.eye(4),
+        4.0 * held,
+        gyro,
+        natural**2 * held,
+        np.zeros((4, 4)),
+        {"plate": np.eye(12, 4)},
     )
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import quietbus as qb
+from oracles.several import with_payload
 from quietbus.analysis.control.modes import free_modes
 from quietbus.analysis.jitter.sweep import SpinningModes, bearing_critical_speeds, critical_speeds
 from quietbus.build import build_satellite
@@ -15,7 +16,7 @@ SPEED = 2 * np.pi * 100.0
 
 def plant(M, C, G, K):
     M, C, G, K = (np.atleast_2d(np.asarray(m, dtype=float)) for m in (M, C, G, K))
-    return SpinningModes(M, C, G, K, 0.0 * K, np.eye(12, len(M)))
+    return SpinningModes(M, C, G, K, 0.0 * K, {"plate": np.eye(12, len(M))})
 
 
 def test_critical_speeds_of_a_single_axis_resonance_have_a_closed_form():
@@ -108,6 +109,25 @@ def test_modes_at_a_speed_are_those_of_the_linearisation(turned, sweep, rpm):
     if rpm == 7000:  # the split counts: without it the modes would be elsewhere
         still = sweep.modes["isolated"].frequencies(0.0)[-6:]
         assert np.max(np.abs([m.pole.imag for m in elastic] / still - 1)) > 0.01
+
+
+def test_modes_of_several_bodies_are_named_as_in_the_analysis():
+    """The satellite's own speeds; its bodies have unlike mass, so that modes part."""
+    scenario = with_payload()
+    expected = [mode for mode in qb.analyze(scenario).modes["free"] if mode.frequency_hz > 1]
+    sweep = qb.jitter(scenario).sweep()
+    found = [mode for mode in sweep.modes["isolated"].modes(1.0) if mode is not None]
+    found = sorted(found, key=lambda mode: mode.frequency_hz)[-len(expected) :]
+    assert len(expected) == 12
+    assert {mode.name.partition(":")[0] for mode in expected} == {"plate", "payload"}
+    for ours, theirs in zip(found, expected, strict=True):
+        assert ours.frequency_hz == pytest.approx(theirs.frequency_hz, rel=1e-8)
+        assert ours.name.partition(":")[0] == theirs.name.partition(":")[0]
+        assert abs(ours.shape.conj() @ theirs.shape) == pytest.approx(
+            np.linalg.norm(ours.shape) * np.linalg.norm(theirs.shape), rel=1e-6
+        )
+    named = {critical.mode.name.partition(":")[0] for critical in sweep.critical["isolated"]}
+    assert named <= {"plate", "payload"}
 
 
 @pytest.mark.parametrize("mount", ["isolated", "rigid"])

@@ -1,5 +1,6 @@
 """Modes of the satellite on its platform: frequency, damping, shape."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,10 +70,8 @@ def _modes(A: np.ndarray, states: list[str]) -> list[Mode]:
         if pole.imag < 0.0 or abs(pole) < RIGID_BODY:
             continue
         shapes = {body: each @ vector for body, each in rows.items()}
-        most = max(shapes, key=lambda body: np.max(np.abs(shapes[body][:6] - shapes[body][6:])))
-        if np.max(np.abs(shapes[most])) == 0.0:
-            continue
-        found.append(mode_of(pole, shapes[most], "" if len(rows) == 1 else f"{most}: "))
+        if any(np.any(shape) for shape in shapes.values()):
+            found.append(mode_of(pole, shapes))
     return sorted(found, key=lambda mode: mode.frequency_hz)
 
 
@@ -81,12 +80,15 @@ def _rows(names: list[str], states: list[str]) -> np.ndarray:
     return np.array([[float(name == state) for state in states] for name in names])
 
 
-def mode_of(pole: complex, shape: np.ndarray, body: str = "") -> Mode:
-    """The mode of a pole [rad/s] and its shape (12,), in space and of any size but zero.
+def mode_of(pole: complex, shapes: Mapping[str, np.ndarray]) -> Mode:
+    """The mode of a pole [rad/s]; of several bodies it is named after the one that moves most.
 
-    ``body`` stands before its name: which of several bodies moves.
+    Args:
+        shapes: by body, (12,) its motion and the bus's, in space and of any size but zero.
     """
-    shape = shape / shape[np.argmax(np.abs(shape))]
+    most = max(shapes, key=lambda body: np.max(np.abs(shapes[body][:6] - shapes[body][6:])))
+    body = "" if len(shapes) == 1 else f"{most}: "
+    shape = shapes[most] / shapes[most][np.argmax(np.abs(shapes[most]))]
     return Mode(
         frequency_hz=float(abs(pole) / (2.0 * np.pi)),
         damped_frequency_hz=float(pole.imag / (2.0 * np.pi)),

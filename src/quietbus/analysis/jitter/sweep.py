@@ -5,7 +5,7 @@ with its gimbals held (the attitude loop left out), as in the linear analysis. T
 the controlled satellite.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -37,7 +37,7 @@ class SpinningModes:
     G: np.ndarray  # (n, n) skew: what the rotors' momentum does at f = 1
     K: np.ndarray  # (n, n)
     L: np.ndarray  # (n, n) zero at rest
-    shapes: np.ndarray  # (12, n) motion of the platform and of the bus by x
+    shapes: Mapping[str, np.ndarray]  # by body: (12, n) its motion and that of the bus by x
 
     @classmethod
     def between(cls, small: Vibration, factor: np.ndarray) -> "SpinningModes":
@@ -59,8 +59,9 @@ class SpinningModes:
             if np.max(np.abs(matrix - line)) > _PROPORTIONAL * size:
                 raise ValueError("the satellite's vibration does not follow the rotors' speed")
         layout, T = small.slow.now.layout, np.asarray(small.projection)[0]
-        two = (layout.names[min(1, len(layout.names) - 1)], BUS)
-        shapes = np.concatenate([T[layout.rows(name)] for name in two])
+        bodies = [name for name in small.free.names if name != BUS] or layout.names[1:2] or (BUS,)
+        bus = T[layout.rows(BUS)]
+        shapes = {name: np.concatenate([T[layout.rows(name)], bus]) for name in bodies}
         return cls(M[0], C[0], G, K[0], L, shapes)
 
     def state_matrix(self, factor: float) -> np.ndarray:
@@ -81,8 +82,9 @@ class SpinningModes:
         """The modes of ``frequencies``; None where nothing oscillates."""
         poles, vectors = eig(self.state_matrix(factor))
         _, which = self._ascending(poles)
+        moved = {body: by @ vectors[: len(self.M)] for body, by in self.shapes.items()}
         return [
-            None if i is None else mode_of(poles[i], self.shapes @ vectors[: len(self.M), i])
+            None if i is None else mode_of(poles[i], {body: by[:, i] for body, by in moved.items()})
             for i in which
         ]
 
@@ -205,8 +207,9 @@ def bearing_modes(satellite: Satellite) -> tuple[BearingMode, ...]:
         name = list(_CHANNELS)[kind]
         unit = np.eye(2 if name == "rocking" else 1)
         turning = gyro * np.array([[0.0, 1.0], [-1.0, 0.0]]) if name == "rocking" else 0.0 * unit
+        shapes = {name: np.eye(12, len(unit))}
         vibration = SpinningModes(
-            unit, 2.0 * ratio * w0 * unit, turning, w0**2 * unit, 0.0 * unit, np.eye(12, len(unit))
+            unit, 2.0 * ratio * w0 * unit, turning, w0**2 * unit, 0.0 * unit, shapes
         )
         found.append(BearingMode(name, tuple(cmgs), vibration))
     return tuple(found)
