@@ -17,6 +17,7 @@ from pathlib import Path
 import quietbus as qb
 
 PEER = [sys.executable, "-c", "import mujoco, xarray, scipy.signal"]
+HELP = [sys.executable, "-m", "quietbus", "--help"]
 IMPORT = [sys.executable, "-c", "import quietbus as qb; qb.simulate"]
 COMMANDS = {
     "jitter --json": ["jitter", "zhang2012", "--json"],
@@ -89,11 +90,13 @@ def main() -> None:
         scenario = Path(folder) / "verified.yaml"
         scenario.write_text(qb.Scenario.from_dict(_zhang() | WANTED).to_yaml(), encoding="utf-8")
         environment = os.environ | {"JAX_COMPILATION_CACHE_DIR": f"{folder}/kept"}
-        for command in (PEER, IMPORT):
+        for command in (PEER, HELP, IMPORT):
             seconds(command, environment)  # reads the files from the disk
         peer = statistics.median(seconds(PEER, environment) for _ in range(runs))
         bound = 3.0 * peer + 1.0
         print(f"import mujoco, xarray, scipy.signal: {peer:.2f} s; bound {bound:.2f} s")
+        told = statistics.median(seconds(HELP, environment) for _ in range(runs))
+        print(f"quietbus --help: {told:.2f} s (bound 0.5)")
         own = statistics.median(seconds(IMPORT, environment) for _ in range(runs))
         print(f"import quietbus, ready to simulate: {own:.2f} s, {own / peer:.2f} of it\n")
         head = f"{'command':<18}{'nothing kept':>13}{'all kept':>10}{'of bound':>10}   of which"

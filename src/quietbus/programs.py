@@ -21,7 +21,6 @@ import os
 import pickle
 import platform
 import sys
-import tempfile
 import warnings
 import weakref
 from collections.abc import Callable, Iterator
@@ -37,6 +36,7 @@ from jax.experimental import serialize_executable
 from jax.experimental.compilation_cache import compilation_cache
 
 from quietbus.jaxconfig import XLA_FLAGS
+from quietbus.writing import replacing
 
 ROOM = 1 << 30  # bytes, of all that is kept
 NAMED = ("quietbus", "jax", "jaxlib", "numpy", "equinox", "diffrax", "builtins", "copyreg")
@@ -336,15 +336,8 @@ def _write(file: Path, said: Any) -> bool:
     body = pickle.dumps(said)
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
-        handle, part = tempfile.mkstemp(dir=file.parent, suffix=".part")
-        try:
-            with os.fdopen(handle, "wb") as stream:
-                stream.write(hashlib.sha256(body).digest() + body)
-            os.replace(part, file)
-        except BaseException:
-            with contextlib.suppress(OSError):
-                os.unlink(part)
-            raise
+        with replacing(file, "kept program") as stream:
+            stream.write(hashlib.sha256(body).digest() + body)
     except OSError as error:
         _warn(f"compiled programs cannot be kept in {file.parent}: {error.strerror or error}")
         return False

@@ -21,6 +21,7 @@ from typing import Any
 BEGINNINGS: Mapping[str, tuple[bytes, ...]] = {
     "run (NetCDF-4)": (b"\x89HDF\r\n\x1a\n",),
     "checkpoint": (b"quietbus checkpoint 1\n",),
+    "kept program": (b"",),  # a damaged one is replaced
     "page (HTML)": (b"<!DOCTYPE html>", b"<!doctype html>"),
     "disturbance block (YAML)": (b"disturbance:",),
     "new scenario (YAML)": (),  # never replaced

@@ -121,7 +121,7 @@ class Study:
         """
         site, legs = self.scenario.sites[0], self.satellite.hexapods[0]
         tangent = [np.asarray(each) for each in legs.tangent]
-        for value, what in zip(tangent, ("stiffness", "damping"), strict=False):
+        for value, what in zip(tangent[:2], ("stiffness", "damping"), strict=True):
             if np.any(value < 0.0):
                 said = f"expected a {what} of 0 or more at rest, as an analysis needs it, got "
                 said = f"{type(legs.strut).__name__}.tension: {said}{value.min():.4g}"
