@@ -104,7 +104,8 @@ def main() -> None:
         for name, words in COMMANDS.items():
             arguments = [str(scenario) if word == "VERIFIED" else word for word in words]
             if "--json" not in words:
-                arguments += ["--output", f"{folder}/out"]
+                out = "run.nc" if words[0] == "simulate" else "pictures"
+                arguments += ["--output", f"{folder}/{out}"]
             command = [sys.executable, "-m", "quietbus", *arguments]
             empty = environment | {"JAX_COMPILATION_CACHE_DIR": f"{folder}/{name}"}
             cold = seconds(command, empty)
